@@ -123,8 +123,9 @@ def _motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> Re
 
 
 def _odd_winch_error(recording: Recording, odd: OddWinch) -> RecordingError:
-    problem = f"winch travel of cable {odd.cable} does not match the positions: it is off by {_percentage(odd.misfit)}"
-    return RecordingError(recording.path, problem + (f", and {odd.cause}" if odd.cause else ""), odd.remedy)
+    off = f"it is off by {_percentage(odd.misfit)}, and {odd.cause}"
+    problem = f"winch travel of cable {odd.cable} does not match the positions: {off}"
+    return RecordingError(recording.path, problem, odd.remedy)
 
 
 def _tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:

@@ -16,8 +16,8 @@ from .recording import Recording
 
 Array = NDArray[np.float64]
 
-# Rms of what a rope's length misses beside a constant, a drift and a scale, over that of its motion: stretch, drums,
-# backlash and a late clock stay below.
+# Rms of what a rope's length misses beside a constant, a drift and a scale, over that of its motion: stretch, drums and
+# backlash stay below.
 MAX_MISFIT, MAX_TOLD = 0.15, 3
 # Cables that hardly move count as if they moved by this share of the rms of all.
 LEAST_MOTION = 0.3
@@ -66,10 +66,10 @@ class _Travel:
 
 
 def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
-    """Cables whose geometric length does not follow what was wound, the three worst first; empty where all do.
+    """Cables whose geometric length does not follow what was wound, for a cause that is seen; the three worst first.
 
     Each cable is judged by itself, by least squares of its length on the travel of its winch. What happened while
-    nothing was recorded is not judged.
+    nothing was recorded is not judged, and what has no such cause is left to the trace: soft ropes swing.
     """
     part = _longest_part(recording)
     rows = moving_rows(robot, part)
@@ -79,7 +79,15 @@ def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
     travel = _Travel(part, rows, lengths, centred(part.wound_lengths()[rows]))
     misfits = [travel.misfit(cable) for cable in range(part.cable_count)]
     odd = sorted((cable for cable, misfit in enumerate(misfits) if misfit > MAX_MISFIT), key=lambda c: -misfits[c])
-    return tuple(OddWinch(cable + 1, misfits[cable], *_cause(robot, travel, cable)) for cable in odd[:MAX_TOLD])
+    # What a delay leaves is proportional to the speed.
+    late = [cable for cable in odd if travel.misfit(cable, part.winch_speed[rows, cable]) <= MAX_MISFIT]
+    causes = ((cable, _fault(travel, cable)) for cable in odd if cable not in late)
+    faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in causes if texts]
+    # Where every exit point seems to be wrong it is another robot, or another frame.
+    if not faults and len(odd) < part.cable_count:
+        points = ((cable, _exit_point(robot, travel, cable)) for cable in odd)
+        faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in points if texts]
+    return tuple(faults[:MAX_TOLD])
 
 
 def _longest_part(recording: Recording) -> Recording:
@@ -88,12 +96,13 @@ def _longest_part(recording: Recording) -> Recording:
     return recording.part(*max(pairwise(edges), key=lambda rows: rows[1] - rows[0]))
 
 
-def _cause(robot: Robot, travel: _Travel, cable: int) -> tuple[str, str]:
-    """The likely cause, as a clause, and what mends it; no cause where none is seen."""
+def _fault(travel: _Travel, cable: int) -> tuple[str, str] | None:
+    """The fault of a winch's column, as a clause, and what mends it; None where none is seen."""
     speeds, name = travel.recording.winch_speed, f"winch_speed_{cable + 1}"
     speed = speeds[:, cable]
     for other in range(speeds.shape[1]):
-        if other != cable and np.any(speed) and np.array_equal(speed, speeds[:, other]):
+        differ = np.sqrt(np.mean((travel.lengths[:, cable] - travel.lengths[:, other]) ** 2))
+        if differ > MAX_MISFIT * travel.motion[cable] and np.any(speed) and np.array_equal(speed, speeds[:, other]):
             return f"{name} repeats winch_speed_{other + 1}", f"record {name}"
     if held := _held_stretch(travel, cable):
         first, last = (f"{travel.recording.time[row]:.5g}" for row in held)
@@ -103,25 +112,19 @@ def _cause(robot: Robot, travel: _Travel, cable: int) -> tuple[str, str]:
         if limit and count > MIN_CLIPPED_SHARE * len(speed):
             return f"{name} is clipped at {limit:.4g} in {count} samples", f"record {name} in its whole range"
     if np.max(np.abs(speed)) > MIN_SPIKE_RATIO * (usual := float(np.quantile(np.abs(speed), SPEED_QUANTILE))) > 0.0:
-        largest = f"{np.max(np.abs(speed)):.3g} m/s, beyond {usual:.3g} in few samples"
-        return (
-            f"{name} reaches {largest}, as where counts wrap",
-            f"record {name} without these, or rope_length_{cable + 1}",
-        )
+        cause = f"{name} reaches {np.max(np.abs(speed)):.3g} m/s, and stays below {usual:.3g} in 99 % of all samples"
+        return f"{cause}, as where counts wrap", f"leave these samples empty, or record rope_length_{cable + 1}"
     if np.any(speed) and not np.any(speed < 0.0):
         return f"{name} is never negative", f"record {name} with its sign, negative where the rope pays out"
     if jump := _jump(travel, cable):
         time, length = jump
         cause = f"its rope is {abs(length):.3g} m {'shorter' if length < 0.0 else 'longer'} from {time:.5g} s on"
         return f"{cause}, as where counts are lost or samples are left out", "cut the recording there"
-    if (point := _exit_point(robot, travel, cable)) is not None:
-        written = ", ".join(f"{coordinate:.4g}" for coordinate in point)
-        return f"its exit point fits at about [{written}] m", f"correct cable[{cable + 1}].anchor in the robot file"
-    return "", f"check {name}, cable[{cable + 1}].anchor, and that winches and positions are those of one motion"
+    return None
 
 
 def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
-    """First and last row of the longest stretch with one speed in which the rope's length changes otherwise."""
+    """First and last row of the longest stretch with one speed in which the platform goes farther than the rope."""
     is_held = np.concatenate([[0], (np.diff(travel.recording.winch_speed[:, cable]) == 0.0).astype(int), [0]])
     edges = np.flatnonzero(np.diff(is_held))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
@@ -129,7 +132,8 @@ def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
         if last - first < MIN_HELD_SAMPLES:
             break
         missed = (travel.lengths + travel.wound)[(travel.rows >= first) & (travel.rows <= last), cable]
-        if missed.size and np.ptp(missed) > travel.motion[cable]:
+        # A rope that is longer than its line goes slack; one that is shorter cannot be.
+        if missed.size and np.max(missed) - missed[0] > travel.motion[cable]:
             return first, last
     return None
 
@@ -150,8 +154,8 @@ def _running_mean(values: Array) -> Array:
     return np.asarray(np.cumsum(values) / np.arange(1, len(values) + 1))
 
 
-def _exit_point(robot: Robot, travel: _Travel, cable: int) -> Array | None:
-    """Another exit point with which a rope's length follows its winch; None of a rigid platform, or where none does."""
+def _exit_point(robot: Robot, travel: _Travel, cable: int) -> tuple[str, str] | None:
+    """The exit point with which a rope's length follows its winch; None of a rigid platform, or where none does."""
     if robot.platform.is_rigid_body:
         return None
     declared, poses = np.array(robot.anchors[cable], dtype=float), recorded_poses(travel.recording, travel.rows)
@@ -170,7 +174,8 @@ def _exit_point(robot: Robot, travel: _Travel, cable: int) -> Array | None:
     if not _is_explained(left, travel.misfit(cable)):
         return None
     declared[free] += fit.x
-    return declared
+    written = ", ".join(f"{coordinate:.4g}" for coordinate in declared)
+    return f"its exit point fits at about [{written}] m", f"correct cable[{cable + 1}].anchor in the robot file"
 
 
 def _is_explained(left: float, misfit: float) -> bool:
