@@ -102,6 +102,22 @@ def test_what_has_no_cause_is_left_to_the_trace() -> None:
     assert odd_winches(example("caroca"), recorded()) == ()
 
 
+def test_a_winch_that_stands_while_its_rope_is_slack_is_no_fault() -> None:
+    """From where its rope is longest on, the platform only comes nearer."""
+    recording = recorded()
+    wound = recording.wound_lengths()
+    longest = np.argmin(wound, axis=0)
+    cable = max(range(3), key=lambda c: np.ptp(wound[longest[c] :, c]))
+    is_after = np.arange(recording.sample_count) >= longest[cable]
+    speeds, tension = recording.winch_speed.copy(), recording.tension.copy()
+    speeds[is_after, cable] = 0.0
+    stands = recording.with_winch_speed(speeds)
+    (odd,) = odd_winches(example("three"), stands)
+    assert (odd.cable, "stays at 0" in odd.cause) == (cable + 1, True)
+    tension[is_after, cable] = 0.0
+    assert odd_winches(example("three"), replace(stands, tension=tension)) == ()
+
+
 def test_ropes_that_move_alike_may_have_one_speed() -> None:
     """Of a motion in a plane of symmetry, seen by a tracker whose unit is wrong by a third."""
     robot, time = example("three"), np.arange(4001) / 100.0

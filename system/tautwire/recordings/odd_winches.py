@@ -25,7 +25,7 @@ INLIER_QUANTILE = 0.95
 # A cause leaves at most this share of the misfit, and of the cable's motion.
 MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
 MAX_GAP_INTERVALS = 5.0
-MIN_HELD_SAMPLES, MIN_CLIPPED_SHARE = 20, 0.03
+MIN_HELD_SAMPLES, MIN_CLIPPED_SHARE, MIN_TAUT_SHARE = 20, 0.03, 0.2
 SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
 
 
@@ -124,7 +124,7 @@ def _fault(travel: _Travel, cable: int) -> tuple[str, str] | None:
 
 
 def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
-    """First and last row of the longest stretch with one speed in which the platform goes farther than the rope."""
+    """First and last row of the longest stretch with one speed in which a taut rope's length changes otherwise."""
     is_held = np.concatenate([[0], (np.diff(travel.recording.winch_speed[:, cable]) == 0.0).astype(int), [0]])
     edges = np.flatnonzero(np.diff(is_held))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
@@ -132,10 +132,18 @@ def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
         if last - first < MIN_HELD_SAMPLES:
             break
         missed = (travel.lengths + travel.wound)[(travel.rows >= first) & (travel.rows <= last), cable]
-        # A rope that is longer than its line goes slack; one that is shorter cannot be.
-        if missed.size and np.max(missed) - missed[0] > travel.motion[cable]:
+        if missed.size < 2:
+            continue
+        # A rope that is longer than its line may be slack, unless its load cell says otherwise.
+        shorter = missed[0] - missed.min() if _is_taut(travel.recording.tension[first:last, cable]) else 0.0
+        if max(missed.max() - missed[0], shorter) > travel.motion[cable]:
             return first, last
     return None
+
+
+def _is_taut(tension: Array) -> bool:
+    measured = tension[np.isfinite(tension)]
+    return bool(measured.size and measured.min() > MIN_TAUT_SHARE * np.median(measured))
 
 
 def _jump(travel: _Travel, cable: int) -> tuple[float, float] | None:
