@@ -135,6 +135,27 @@ def test_effects_are_not_taken_for_odd_load_cells(effects: dict[str, Any]) -> No
     assert recording_mistakes(robot, recorded("three", 3, effects)) == ()
 
 
+def test_one_load_cell_that_was_tared_under_load_is_told_alone() -> None:
+    robot, recording = shipped("three")
+    tension = recording.tension.copy()
+    tension[:, 1] -= tension[:10, 1].mean()
+    (error,) = recording_mistakes(robot, replace(recording, tension=tension))
+    assert "if tension_2 was tared at the start, where statics gives" in error.problem
+    (offset,) = (column["offset"] for column in told_columns(error.hint).values())
+    assert -offset == pytest.approx(static_tensions(robot)[1], rel=1e-3)
+
+
+def test_a_mass_in_pounds_is_told() -> None:
+    robot, recording = shipped("three")
+    platform = replace(robot.platform, mass=robot.platform.mass / 0.45359237)
+    (error,) = recording_mistakes(replace(robot, platform=platform), recording)
+    assert "if the robot file's platform.mass is in lb" in error.problem
+    assert "multiply it by 0.4536" in error.hint
+    for factor in (0.6, 1.6, 2.0):
+        other = replace(robot.platform, mass=robot.platform.mass * factor)
+        assert recording_mistakes(replace(robot, platform=other), recording) == ()
+
+
 def test_cells_that_show_nothing_at_the_start_are_not_taken_for_tared_ones(recwarn: pytest.WarningsRecorder) -> None:
     robot, recording = shipped("three")
     halved = np.where(recording.time[:, None] > recording.time[0] + 1.0, 0.5 * recording.tension, np.nan)

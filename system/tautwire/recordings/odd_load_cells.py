@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 MIN_MISFIT, MAX_CORRECTED_MISFIT = 0.05, 0.3
 # By what a payload may multiply all tensions.
 MASS_RATIOS = (0.25, 10.0)
+POUND, MAX_POUND_ERROR = 0.45359237, 0.03  # kg
 # Share of the static tension below which a tared cell begins, and the time over which that is averaged.
 MAX_TARED_SHARE, TARED_DURATION = 0.03, 0.1
 
@@ -78,28 +79,34 @@ def _of_one_factor(balance: ForceBalance) -> Iterator[CellReading]:
             "declare factor, and offset as the number without load, of each in [recording.columns], by its calibration",
         )
         yield CellReading(_misfit(balance, np.full(count, factor)), mistake)
+    elif abs(factor * POUND - 1.0) <= MAX_POUND_ERROR:
+        mistake = Mistake("the robot file's platform.mass is in lb", convert("it", POUND))
+        yield CellReading(_misfit(balance, np.full(count, factor)), mistake)
 
 
 def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterator[CellReading]:
-    """Cells that all begin at zero, under the static tension."""
+    """Cells, one or all of them, that begin at zero under the static tension."""
     try:
         static = np.array(static_tensions(robot))
     except InputError:
         return
     has_load_cell = np.array(balance.has_load_cell)
-    start = recording.tension[recording.time <= recording.time[0] + TARED_DURATION][:, has_load_cell]
-    if not np.isfinite(start).any(axis=0).all():
+    start = recording.tension[recording.time <= recording.time[0] + TARED_DURATION]
+    if not np.isfinite(start[:, has_load_cell]).any(axis=0).all():
         return
-    if not np.all(np.abs(np.nanmean(start, axis=0)) <= MAX_TARED_SHARE * static[has_load_cell]):
-        return
-    names = ", ".join(f"tension_{cell + 1}" for cell in np.flatnonzero(has_load_cell))
-    texts = [f"{value:.4g}" for value in static[has_load_cell]]
-    corrections = tuple(
-        ColumnCorrection(f"tension_{cell + 1}", shift=float(static[cell])) for cell in np.flatnonzero(has_load_cell)
+    begin = np.array(
+        [np.nanmean(column) if has else np.inf for column, has in zip(start.T, has_load_cell, strict=True)]
     )
+    is_tared = np.abs(begin) <= MAX_TARED_SHARE * static
+    if not is_tared.any():
+        return
+    cells = np.flatnonzero(is_tared)
+    names = ", ".join(f"tension_{cell + 1}" for cell in cells)
+    texts = [f"{value:.4g}" for value in static[cells]]
+    corrections = tuple(ColumnCorrection(f"tension_{cell + 1}", shift=float(static[cell])) for cell in cells)
     mistake = Mistake(
-        f"{names} were tared at the start, where statics gives {', '.join(texts)} N",
+        f"{names} {'were' if len(cells) > 1 else 'was'} tared at the start, where statics gives {', '.join(texts)} N",
         "add that, or tare without load",
         corrections,
     )
-    yield CellReading(_misfit(balance, np.ones(len(static)), static), mistake)
+    yield CellReading(_misfit(balance, np.ones(len(static)), np.where(is_tared, static, 0.0)), mistake)
