@@ -179,7 +179,7 @@ def test_a_dialect_is_read_as_the_standard_file(tmp_path: Path, content: str | b
         (ISO.replace("00:00:00Z", "00:00:00"), ["line 3, column time", "'2024-06-01T00:00:00'", "offset from UTC"]),
         (ISO.replace("06-01", "06-31"), ["line 3, column time", "'2024-06-31T00:00:00Z'"]),
         (ISO.replace("2024-06-01T00", "2024-06-01T24"), ["line 3, column time", "ISO 8601"]),
-        (LOCAL.replace("2024-05-31", "31.05.2024"), ["line 2, column time", "'31.05.2024 23:59:59.99'", "ISO 8601"]),
+        (LOCAL.replace("2024-05-31", "31-05-2024"), ["line 2, column time", "'31-05-2024 23:59:59.99'", "ISO 8601"]),
         (CLOCK.replace("10:00:00,", "10:00:60,"), ["line 3, column time", "'10:00:60'", "hh:mm:ss"]),
         (CLOCK.replace("10:00:00,", "600,"), ["line 3, column time", "'600'", "hh:mm:ss"]),
         (CLOCK.replace("10:00:00,", "0:00:00,"), ["line 3, column time", "rise"]),

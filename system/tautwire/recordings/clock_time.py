@@ -1,4 +1,4 @@
-"""Clock times of a recording: ISO 8601 or hh:mm:ss, in seconds from the first sample."""
+"""Clock times of a recording, with a date or without, in seconds from the first sample."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ _CLOCK = rf"([0-9]{{1,3}}):([0-5][0-9]):([0-5][0-9]){_FRACTION}"
 _TIME_OF_DAY = re.compile(_CLOCK)
 _ISO_8601 = re.compile(rf"([0-9]{{4}})-([0-9]{{2}})-([0-9]{{2}})[T ]{_CLOCK}\s?(Z|[+-][0-9]{{2}}:?[0-5][0-9])?")
 
-_DAY = 86_400 * 10**9  # ns
+_WITH_POINTS = re.compile(rf"([0-9]{{1,2}})\.([0-9]{{1,2}})\.([0-9]{{4}})[ T]{_CLOCK}")
+_WITH_SLASHES = re.compile(rf"[0-9]{{1,2}}/[0-9]{{1,2}}/[0-9]{{4}},? {_CLOCK}(?:\s?([AaPp][Mm]))?")
+_MINUTES = re.compile(r"([0-5]?[0-9]):([0-5][0-9])[.,]([0-9]{1,9})")
+
+_HOUR, _DAY = 3600 * 10**9, 86_400 * 10**9  # ns
 
 
 @dataclass(frozen=True)
@@ -29,19 +33,25 @@ class ClockFormat:
             return math.nan
         elapsed = nanoseconds - self.origin
         # A time of day that is half a day before the first sample's is that of the next day.
-        if self.style == TIME_OF_DAY and elapsed < -_DAY // 2 and self.origin < _DAY:
-            elapsed += _DAY
+        period = _PERIODS.get(self.style, 0)
+        if elapsed < -period // 2 and self.origin < period:
+            elapsed += period
         return elapsed / 1e9
 
 
 TIME_OF_DAY = "hh:mm:ss"
+MINUTES = "mm:ss"
+DATE_WITH_POINTS = "dd.mm.yyyy hh:mm:ss"
+# Day and month stand in either order, so that only the time of day counts.
+DATE_WITH_SLASHES = "the hh:mm:ss beside a date"
 ISO_8601 = "ISO 8601"
 ISO_8601_WITH_OFFSET = "ISO 8601 with an offset from UTC"
+_PERIODS = {TIME_OF_DAY: _DAY, DATE_WITH_SLASHES: _DAY, MINUTES: _HOUR}
 
 
 def clock_format(first_cell: str) -> ClockFormat | None:
     """The format of a column of clock times that begins with this cell; None where that is no clock time."""
-    for style in (TIME_OF_DAY, ISO_8601, ISO_8601_WITH_OFFSET):
+    for style in (TIME_OF_DAY, ISO_8601, ISO_8601_WITH_OFFSET, DATE_WITH_POINTS, DATE_WITH_SLASHES, MINUTES):
         origin = _nanoseconds(first_cell, style)
         if origin is not None:
             return ClockFormat(style, origin)
@@ -49,18 +59,45 @@ def clock_format(first_cell: str) -> ClockFormat | None:
 
 
 def _nanoseconds(cell: str, style: str) -> int | None:
-    """Clock time in ns, of its day or since year 1; whole numbers lose nothing of a long date."""
+    """Clock time in ns, of its day or hour or since year 1; whole numbers lose nothing of a long date."""
+    text = cell.strip()
     if style == TIME_OF_DAY:
-        match = _TIME_OF_DAY.fullmatch(cell.strip())
+        match = _TIME_OF_DAY.fullmatch(text)
         return None if match is None else _clock_nanoseconds(match.groups())
-    match = _ISO_8601.fullmatch(cell.strip())
-    if match is None or (match.group(8) is not None) != (style == ISO_8601_WITH_OFFSET) or int(match.group(4)) > 23:
+    if style == MINUTES:
+        match = _MINUTES.fullmatch(text)
+        return None if match is None else _clock_nanoseconds(("0", *match.groups()))
+    if style == DATE_WITH_SLASHES:
+        match = _WITH_SLASHES.fullmatch(text)
+        return None if match is None else _half_day_nanoseconds(match.groups())
+    if style == DATE_WITH_POINTS:
+        match = _WITH_POINTS.fullmatch(text)
+        return None if match is None else _dated_nanoseconds(match.groups()[2::-1], match.groups()[3:7])
+    match = _ISO_8601.fullmatch(text)
+    if match is None or (match.group(8) is not None) != (style == ISO_8601_WITH_OFFSET):
+        return None
+    nanoseconds = _dated_nanoseconds(match.groups()[:3], match.groups()[3:7])
+    return None if nanoseconds is None else nanoseconds - _offset_nanoseconds(match.group(8))
+
+
+def _dated_nanoseconds(year_month_day: tuple[str, ...], clock: tuple[str | None, ...]) -> int | None:
+    """Time since year 1; None where there is no such day or hour."""
+    if int(clock[0] or 0) > 23:
         return None
     try:
-        day = date(int(match.group(1)), int(match.group(2)), int(match.group(3))).toordinal()
+        year, month, day = map(int, year_month_day)
+        return date(year, month, day).toordinal() * _DAY + _clock_nanoseconds(clock)
     except ValueError:
         return None
-    return day * _DAY + _clock_nanoseconds(match.groups()[3:7]) - _offset_nanoseconds(match.group(8))
+
+
+def _half_day_nanoseconds(parts: tuple[str | None, ...]) -> int | None:
+    """Time of day, of twelve hours where AM or PM is said; None where there is no such hour."""
+    half, hours = (parts[4] or "").upper(), int(parts[0] or 0)
+    if not (1 <= hours <= 12 if half else hours <= 23):
+        return None
+    hours = hours % 12 + (12 if half == "PM" else 0) if half else hours
+    return _clock_nanoseconds((str(hours), *parts[1:4]))
 
 
 def _clock_nanoseconds(parts: tuple[str | None, ...]) -> int:
