@@ -23,6 +23,7 @@ from tests.support.laboratory import (
     as_lengths,
     empty_speeds,
     lost_positions,
+    of_one_cable,
     reordered,
     scaled,
     standard,
@@ -88,6 +89,9 @@ READ: dict[str, Writer] = {
     "ISO 8601 over midnight": with_clock("iso"),
     "clock times": with_clock("clock"),
     "clock times over midnight": with_clock("midnight"),
+    "German dates over midnight": with_clock("points"),
+    "American dates over midnight": with_clock("slashes"),
+    "minutes of a spreadsheet over the hour": with_clock("minutes"),
 }
 
 REFUSED: dict[str, tuple[Writer, str]] = {
@@ -100,6 +104,15 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     "one speed of the other sign": (scaled(["winch_speed_3"], -1.0), "winch_speed_3 has the other sign"),
     "winches in another order": (reordered(SPEEDS, [1, 2, 0]), "winches of cables 1 to 3 are winch_speed_3"),
     "positions in mm": (scaled(AXES, 1e3), "x, y, z are in mm"),
+    "positions in mm that are said to be in cm": (stated(AXES, 1e3, "cm"), "x, y, z are in mm, not in cm"),
+    "an encoder that dies": (
+        of_one_cable("winch_speed_2", lambda speed: speed.where(speed.index < 300, 0.0)),
+        "winch_speed_2 stays at 0 from ",
+    ),
+    "a speed that is another's": (
+        lambda f: text_of(f.assign(winch_speed_2=f.winch_speed_1)),
+        "winch_speed_2 repeats winch_speed_1",
+    ),
     "axes in another order": (reordered(AXES, [2, 0, 1]), "x, y, z are the recording's y, z, x"),
     "another origin": (
         lambda f: text_of(f.assign(**{a: f[a] - f[a][0] for a in AXES})),
@@ -136,6 +149,10 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     "one tension in kN": (scaled(CELLS[1:2], 1e-3), "tension_2 alone is in kN"),
     "one tension of the other sign": (scaled(CELLS[1:2], -1.0), "tension_2 alone has the other sign"),
     "load cells tared under load": (tared, "were tared at the start, where statics gives 159"),
+    "one load cell tared under load": (
+        of_one_cable("tension_2", lambda cell: cell - cell[:10].mean()),
+        "if tension_2 was tared at the start, where statics gives 159",
+    ),
     "load cells swapped": (reordered(CELLS, [1, 0, 2]), "are tension_2, tension_1, tension_3"),
     "commas for separators and decimals": (lambda f: text_of(f, ",", ",").replace('"', ""), "cells, the header has"),
     "no header": (lambda frame: text_of(frame, header=False), "the header is missing"),
@@ -240,6 +257,7 @@ ROBOTS: dict[str, tuple[str, str, str]] = {
     "modulus in MPa": ("modulus = 1.022e11", "modulus = 102200.0", "in MPa as 1.022e+11"),
     "area in mm^2": ("area = 1.25664e-5", "area = 12.5664", "in mm^2 as 12.5664e-6"),
     "damping of a whole rope": ("damping = 4.0e8", "damping = 4.0e12", "write it in Pa s"),
+    "mass in lb": ("mass = 300.0", "mass = 661.4", "platform.mass is in lb"),
     "anchors in mm": ("50.0, 50.0]", "50000.0, 50000.0]", "in mm multiply by 0.001"),
 }
 

@@ -65,6 +65,9 @@ def with_clock(form: str) -> Writer:
         "iso": lambda t: (begin + t).isoformat() + "Z",
         "clock": lambda t: f"10:00:{t.total_seconds():06.3f}",
         "midnight": lambda t: str((begin + t).time()),
+        "points": lambda t: f"{begin + t:%d.%m.%Y %H:%M:%S.%f}",
+        "slashes": lambda t: f"{begin + t:%m/%d/%Y %I:%M:%S.%f %p}",
+        "minutes": lambda t: f"{begin + t:%M:%S.%f}",
     }
 
     def write(frame: Frame) -> str:
@@ -82,6 +85,11 @@ def turned(frame: Frame) -> str:
 
 def tared(frame: Frame) -> str:
     return text_of(frame.assign(**{cell: frame[cell] - frame[cell][:10].mean() for cell in CELLS}))
+
+
+def of_one_cable(column: str, change: Callable[[pd.Series], pd.Series]) -> Writer:
+    """One column whose numbers are others."""
+    return lambda frame: text_of(frame.assign(**{column: change(frame[column])}))
 
 
 def as_lengths(factor: float) -> Writer:

@@ -16,8 +16,8 @@ from .recording import Recording
 
 Array = NDArray[np.float64]
 
-# Rms of what a rope's length misses beside a constant, a drift and a scale, over that of its motion: stretch, drums and
-# backlash stay below.
+# Rms of what a rope's length misses beside a constant and a scale, over that of its motion: stretch, drums and backlash
+# stay below.
 MAX_MISFIT, MAX_TOLD = 0.15, 3
 # Cables that hardly move count as if they moved by this share of the rms of all.
 LEAST_MOTION = 0.3
@@ -25,6 +25,7 @@ INLIER_QUANTILE = 0.95
 # A cause leaves at most this share of the misfit, and of the cable's motion.
 MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
 MAX_GAP_INTERVALS = 5.0
+DRUM_SCALES = (0.7, 1.4)
 MIN_HELD_SAMPLES, MIN_CLIPPED_SHARE, MIN_TAUT_SHARE = 20, 0.03, 0.2
 SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
 
@@ -49,18 +50,23 @@ class _Travel:
     wound: Array
 
     @property
+    def drift(self) -> Array:
+        """What speeds that are off by a constant leave, (M,)."""
+        return np.asarray(self.recording.time[self.rows] - self.recording.time[self.rows[0]])
+
+    @property
     def motion(self) -> Array:
         """Rms of each cable's length, at least a share of that of all, (n,)."""
         squares = np.mean(self.lengths**2, axis=0)
         return np.asarray(np.sqrt(np.maximum(squares, LEAST_MOTION**2 * squares.mean())))
 
     def misfit(self, cable: int, *others: Array) -> float:
-        """Rms of a cable's length beside constant, drift, scale and other columns (M,), over that of its motion."""
-        time = self.recording.time[self.rows]
-        basis = np.column_stack([np.ones_like(time), time - time[0], self.wound[:, cable], *others])
-        basis = basis / np.maximum(np.abs(basis).max(axis=0), np.finfo(float).tiny)
-        missed = self.lengths[:, cable] - basis @ np.linalg.lstsq(basis, self.lengths[:, cable], rcond=None)[0]
-        squares = missed**2
+        """Rms of a cable's length beside constant, a drum's scale and other columns (M,), over that of its motion."""
+        wound, length = self.wound[:, cable], self.lengths[:, cable]
+        basis = np.column_stack([np.ones_like(wound), wound, *others])
+        scale = float(np.clip(-np.linalg.lstsq(basis, length, rcond=None)[0][1], *DRUM_SCALES))
+        others_alone, missed = np.delete(basis, 1, axis=1), length + scale * wound
+        squares = (missed - others_alone @ np.linalg.lstsq(others_alone, missed, rcond=None)[0]) ** 2
         inliers = squares <= np.quantile(squares, INLIER_QUANTILE)
         return float(np.sqrt(squares[inliers].mean()) / self.motion[cable])
 
@@ -85,7 +91,8 @@ def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
     faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in causes if texts]
     # Where every exit point seems to be wrong it is another robot, or another frame.
     if not faults and len(odd) < part.cable_count:
-        points = ((cable, _exit_point(robot, travel, cable)) for cable in odd)
+        steady = [cable for cable in odd if travel.misfit(cable, travel.drift) > MAX_MISFIT]
+        points = ((cable, _exit_point(robot, travel, cable)) for cable in steady)
         faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in points if texts]
     return tuple(faults[:MAX_TOLD])
 
@@ -154,7 +161,8 @@ def _jump(travel: _Travel, cable: int) -> tuple[float, float] | None:
     steps = after[::-1][1:] - before[:-1]
     row = int(np.argmax(steps**2 * counts * (len(missed) - counts))) + 1
     is_after = (np.arange(len(missed)) >= row).astype(float)
-    is_explained = _is_explained(travel.misfit(cable, is_after), travel.misfit(cable))
+    misfits = travel.misfit(cable, travel.drift, is_after), travel.misfit(cable, travel.drift)
+    is_explained = _is_explained(*misfits)
     return (float(travel.recording.time[travel.rows[row]]), float(steps[row - 1])) if is_explained else None
 
 
