@@ -13,6 +13,7 @@ MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
 # A rope thicker than 16 mm is there to carry more than this: else its area is a diameter.
 MIN_THICK_AREA, MIN_STRESS, MIN_STRAIN = 2e-4, 1e6, 2e-4  # m^2, Pa
 MAX_COORDINATE = 2000.0  # m
+MAX_GRAVITY, STANDARD_GRAVITY = 30.0, 9.80665  # m/s^2
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
 MAX_SIZE_RATIO = 10.0  # of the platform, by the distance from it to the farthest exit point
 MAX_FREQUENCY = 5000.0  # Hz, of a platform on ropes
@@ -32,7 +33,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     errors = []
     for number, cable in enumerate(robot.cables, 1):
         errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
-    errors += _platform_errors(robot, file)
+    errors += [*_platform_errors(robot, file), *_gravity_errors(robot, file)]
     yield from errors
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
         problem = f"is {max(map(abs, robot.platform.start)):g} m from the origin, no robot is larger than 2 km"
@@ -76,6 +77,16 @@ def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Itera
         problem = f"is {area:g} m^2, a rope {thickness:.0f} mm thick, and some {load:.3g} N are all that it carries"
         hint = f"write the area in m^2, if this is the diameter in m as {math.pi / 4.0 * area**2:.4g}"
         yield _error(file, ("cable", number - 1, "area"), problem, hint)
+
+
+def _gravity_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Error for a gravity of no planet, or of 1, which is that of the Earth in g."""
+    if robot.gravity > MAX_GRAVITY:
+        hint = f"write it in m/s^2, if this is in mm/s^2 as {robot.gravity / 1e3:g}"
+        yield _error(file, ("gravity",), f"is {robot.gravity:g} m/s^2, {STANDARD_GRAVITY:.3g} on the Earth", hint)
+    elif robot.gravity == 1.0:
+        hint = f"write it in m/s^2, if this is in g as {STANDARD_GRAVITY:g}; on the Moon it is 1.62"
+        yield _error(file, ("gravity",), "is 1 m/s^2, as of no planet or moon that has robots", hint)
 
 
 def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
