@@ -132,7 +132,6 @@ def test_the_frame_of_a_tracker_is_told_whatever_its_clock(monkeypatch: pytest.M
     change, causes = FRAMES[frame]
     log, tracker = files("three")
     framed = replace(tracker, position=change(tracker.position))
-    assert tracker_mistakes(example("three"), log, framed) == ()
     (mistakes,) = frame_mistakes(example("three"), log, framed)
     assert len(mistakes) == len(causes) and all(mistake.is_of_tracker for mistake in mistakes)
     assert all(cause in mistake.cause for cause, mistake in zip(causes, mistakes, strict=True))
@@ -158,6 +157,7 @@ def test_another_motion_is_no_mistake_of_the_frame() -> None:
     assert frame_mistakes(example("three"), log, replace(tracker, position=other)) == ()
 
 
+@pytest.mark.validate(but=["cm"])
 @pytest.mark.parametrize(("stated", "unit", "size"), [("cm", "mm", 1e3), ("mm", "m", 1.0)])
 def test_a_unit_that_is_stated_wrongly_is_told(
     monkeypatch: pytest.MonkeyPatch, stated: str, unit: str, size: float

@@ -126,7 +126,7 @@ def _fault(travel: _Travel, cable: int) -> tuple[str, str] | None:
     if jump := _jump(travel, cable):
         time, length = jump
         cause = f"its rope is {abs(length):.3g} m {'shorter' if length < 0.0 else 'longer'} from {time:.5g} s on"
-        return f"{cause}, as where counts are lost or samples are left out", "cut the recording there"
+        return f"{cause}, as where counts are lost, samples left out or the tracker moved", "cut the recording there"
     return None
 
 
