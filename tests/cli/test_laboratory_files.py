@@ -97,6 +97,10 @@ READ: dict[str, Writer] = {
 REFUSED: dict[str, tuple[Writer, str]] = {
     "time in ms": (scaled(["time"], 1e3), "time is in ms"),
     "time in us": (scaled(["time"], 1e6), "time is in us"),
+    "row numbers as times": (
+        lambda f: text_of(f.assign(time=range(len(f)))),
+        "its factor is the time between samples in s, about 0.01",
+    ),
     "speeds in mm/s": (scaled(SPEEDS, 1e3), "winch_speed_1 to winch_speed_3 are in mm/s"),
     "speeds in m/min": (scaled(SPEEDS, 60.0), "winch_speed_1 to winch_speed_3 are in m/min"),
     "speeds of a drum's angle": (scaled(SPEEDS, 20.0), "drums with a radius of 0.04999 m if in rad/s"),

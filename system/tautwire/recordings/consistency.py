@@ -14,6 +14,7 @@ from .geometry_reading import GeometryReading, recorded_poses
 from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
 from .mistaken_tensions import TensionCheck, check_tensions
+from .motion_regression import length_regression
 from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 
@@ -28,6 +29,7 @@ MAX_WINCH_SPEED, SPEED_QUANTILE = 60.0, 0.99
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
+MAX_SAMPLE_INTERVAL = 0.5  # s
 # Their contributions to readings and points, and beside these to forces, are not computed here.
 EFFECTS_ON_POSES = frozenset(
     ("frame", "sensor_delay", "sensor_gain", "sensor_offset", "attachment", "centre_of_mass"),
@@ -63,6 +65,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     motion = check_motion(robot, recording)
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
+    if motion is not None and motion.misfit > MAX_MISFIT and (error := row_number_error(robot, recording)):
+        return (error,)
     if motion is not None and motion.readings:
         errors.append(_motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
@@ -100,6 +104,21 @@ def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
             "[recording.columns]"
         )
     return RecordingError(recording.path, problem, hint)
+
+
+def row_number_error(robot: Robot, recording: Recording) -> RecordingError | None:
+    """The error of times that count samples, whose interval the winch travel then tells; None of other times."""
+    if not np.all(np.diff(recording.time) == 1.0) or recording.rope_lengths:
+        return None
+    regression = length_regression(robot, recording)
+    if regression is None:
+        return None
+    interval = float(np.nanmedian(regression.slopes))
+    if not 0.0 < interval < MAX_SAMPLE_INTERVAL:
+        return None
+    problem = "time rises by exactly 1 from row to row, as the number of a sample does, and winch travel does not match"
+    hint = f"its factor is the time between samples in s, about {interval:.3g} by the winch travel"
+    return RecordingError(recording.path, problem, f"declare time in [recording.columns]: {hint}")
 
 
 def speed_error(recording: Recording) -> RecordingError | None:

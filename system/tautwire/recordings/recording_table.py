@@ -267,9 +267,8 @@ def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | Recor
     )
     if epoch is not None:
         problem = f"is {format_value(cell)}, as {epoch} since 1970 are"
-        return _cell_error(
-            row, name, problem, f'write time [{epoch}] in the header, or unit = "{epoch}" in [recording.columns]'
-        )
+        line = f'time = {{ unit = "{epoch}" }} in [recording.columns], of a tracker in [recording.tracker.columns]'
+        return _cell_error(row, name, problem, f"write time [{epoch}] in the header, or {line}")
     return _cell_error(row, name, problem, "give it in SI units")
 
 
