@@ -55,6 +55,11 @@ LOGS = {
     ),
     "French": (renamed("Vitesse treuil {} (m/s)", "Tension c\u00e2ble {} (N)", "{} (m)", "Temps (s)"), {}, ";"),
     "Spanish": (renamed("Velocidad {} (m/s)", "Fuerza {} (N)", "Posicion {} (m)", "Tiempo (s)"), {}, ";"),
+    "ROS, exported": (
+        renamed("/drives/winch_{}/velocity", "/load_cell_{}/wrench.force.z", "/tracker/position/{}", "/time"),
+        {},
+        ",",
+    ),
     "units before the numbers": (
         renamed("v_mm/s_{}", "F_kN_{}", "pos_{}", "t_ms"),
         {"time": 1e3, "winch": 1e3, "tension": 1e-3},
@@ -150,6 +155,11 @@ def proposed(tmp_path: Path, *names: str) -> tuple[dict[str, dict[str, str]], di
     log.write_text(f"{','.join(names)}\n{','.join('1' for _ in names)}\n", encoding="utf-8")
     proposal = propose_columns(column_names(log), 3)
     return {each.column: asdict(each) for each in proposal.columns}, dict(proposal.unused)
+
+
+def test_a_force_along_several_axes_is_no_tension(tmp_path: Path) -> None:
+    columns, unused = proposed(tmp_path, "time", *(f"/wrench_1/force/{axis}" for axis in "xyz"))
+    assert set(columns) == {"time"} and len(unused) == 3
 
 
 @pytest.mark.parametrize(

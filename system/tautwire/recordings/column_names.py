@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
 
 from ..errors import RecordingError, format_value
 from ..input_files import read_encoded_text
+from ..robot.schema import AXES
 from .csv_lines import split_cells, unit_in_name, without_comment_mark
 from .csv_names import NamesLine, first_samples, names_above
 from .mat_file import is_mat, mat_column_names
@@ -21,6 +23,8 @@ from .units import is_any_unit
 
 MAX_CSV_SIZE = 2**31  # bytes
 MAX_HEAD_LINES = 500
+
+_FORCE_ALONG = re.compile(r"((?:.*[/._])?force[/._])([xyz])")
 
 
 @dataclass(frozen=True)
@@ -46,14 +50,23 @@ def column_names(path: Path) -> list[ColumnName]:
     if is_mat(path):
         return [ColumnName(name, standard, name) for name, standard in mat_column_names(path).items()]
     if is_parquet(path):
-        return [_named(name) for name in parquet_column_names(path)]
+        names = parquet_column_names(path)
+        return [_named(name, "", names) for name in names]
     layout = csv_layout(path)
-    return [_named(name, unit) for name, unit in zip(layout.names, layout.units or repeat(""), strict=False)]
+    return [
+        _named(name, unit, layout.names) for name, unit in zip(layout.names, layout.units or repeat(""), strict=False)
+    ]
 
 
-def _named(name: str, unit: str = "") -> ColumnName:
-    """A column by its name; a unit from elsewhere in the file counts as if it stood behind the name."""
-    words = f"{name} [{unit}]" if unit and not unit_in_name(name) else name
+def _named(name: str, unit: str, names: Collection[str]) -> ColumnName:
+    """A column by its name; a unit from elsewhere in the file counts as if it stood behind the name.
+
+    A force along one axis alone, as of a wrench whose other numbers were not exported, is a tension.
+    """
+    along = _FORCE_ALONG.fullmatch(name)
+    is_alone = along is not None and not any(along[1] + axis in names for axis in AXES if axis != along[2])
+    shown = along[1] if along and is_alone else name
+    words = f"{shown} [{unit}]" if unit and not unit_in_name(name) else shown
     return ColumnName(name, name if is_column_name(name) else None, words)
 
 
