@@ -259,7 +259,7 @@ REFUSED: dict[str, tuple[Writer, str]] = {
 ROBOTS: dict[str, tuple[str, str, str]] = {
     "modulus in GPa": ("modulus = 1.022e11", "modulus = 102.2", "in GPa as 1.022e+11"),
     "modulus in MPa": ("modulus = 1.022e11", "modulus = 102200.0", "in MPa as 1.022e+11"),
-    "area in mm^2": ("area = 1.25664e-5", "area = 12.5664", "in mm^2 as 12.5664e-6"),
+    "area in mm^2": ("area = 1.25664e-5", "area = 12.5664", "in mm^2 as 1.25664e-05"),
     "damping of a whole rope": ("damping = 4.0e8", "damping = 4.0e12", "write it in Pa s"),
     "gravity in mm/s^2": ("gravity = 9.81", "gravity = 9810.0", "if this is in mm/s^2 as 9.81"),
     "gravity in g": ("gravity = 9.81", "gravity = 1", "if this is in g as 9.80665"),

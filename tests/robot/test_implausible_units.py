@@ -31,7 +31,11 @@ def test_shipped_robots_are_plausible(name: str) -> None:
         ({"modulus": 100.0}, "modulus", "in GPa as 1e+11"),
         ({"modulus": 2.5}, "modulus", "in GPa as 2.5e+09"),
         ({"modulus": 9.5e4}, "modulus", "in MPa as 9.5e+10"),
-        ({"area": 3.0}, "area", "in mm^2 as 3e-6"),
+        ({"area": 3.0}, "area", "in mm^2 as 3e-06"),
+        ({"area": 4.0}, "area", "if this is the diameter in mm as 1.25664e-05"),
+        ({"area": 0.2}, "area", "if this is in cm^2 as 2e-05"),
+        ({"modulus": 1.5e7}, "modulus", "write it in Pa, if this is in psi as 1.03421e+11"),
+        ({"modulus": 1e6, "area": 1e-5}, "modulus", "if this is E A in N as 1e+11"),
         ({"area": 0.004}, "area", "the diameter in m as 1.257e-05"),
         ({"anchor": (0.0, 0.0, 12000.0)}, "anchor", "in mm multiply by 0.001"),
         ({"modulus": 1e9, "damping": 39e9}, "damping", "write it in Pa s"),
@@ -71,7 +75,7 @@ def test_a_modulus_in_gpa_and_an_area_in_mm2_are_both_told() -> None:
     errors = list(implausible_units(robot, "robot.toml"))
     hints = {error.key_path[-1]: error.hint for error in errors}
     assert hints.keys() == {"modulus", "area"} and len(errors) == 2 * robot.cable_count
-    assert "in GPa as 1e+11" in hints["modulus"] and "in mm^2 as 3e-6" in hints["area"]
+    assert "in GPa as 1e+11" in hints["modulus"] and "in mm^2 as 3e-06" in hints["area"]
 
 
 def test_a_soft_rope_with_much_damping_is_plausible() -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 
 from ..errors import RobotFileError
 from .schema import Cable, Robot
 
-MAX_MODULUS_IN_GPA = 1000.0  # of any fibre
+MODULI, PSI = (2e8, 1e12), 6894.757  # Pa, from nylon to the stiffest fibre
+STRESSES = (1e6, 2e9)  # Pa
 MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
 # A rope thicker than 16 mm is there to carry more than this: else its area is a diameter.
 MIN_THICK_AREA, MIN_STRESS, MIN_STRAIN = 2e-4, 1e6, 2e-4  # m^2, Pa
@@ -46,11 +47,12 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
     modulus, area = cable.modulus, cable.area
     area_in_m2 = area if area <= MAX_AREA else 1e-6 * area
     if modulus * area_in_m2 < weight:
-        unit, factor = ("GPa", 1e9) if modulus <= MAX_MODULUS_IN_GPA else ("MPa", 1e6)
         problem = (
             f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to the double"
         )
-        hint = f"write it in Pa, if this is in {unit} as {modulus * factor:g}"
+        meant = {"in GPa": 1e9 * modulus, "in MPa": 1e6 * modulus, "in psi": PSI * modulus}
+        meant |= {"E A in N": modulus / area_in_m2}
+        hint = f"write it in Pa, {_alternatives(meant, MODULI)}"
         yield _error(file, ("cable", number - 1, "modulus"), problem, hint)
     elif cable.damping > MAX_RETARDATION * modulus:
         problem = (
@@ -59,14 +61,22 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
         yield _error(file, ("cable", number - 1, "damping"), problem, DAMPING_HINT)
     if area > MAX_AREA:
         problem = f"is {area:g} m^2, ropes have at most {MAX_AREA:g}"
-        yield _error(
-            file, ("cable", number - 1, "area"), problem, f"write it in m^2, if this is in mm^2 as {area:g}e-6"
-        )
+        meant = {"in mm^2": 1e-6 * area, "in cm^2": 1e-4 * area}
+        meant |= {"the diameter in mm": math.pi / 4.0 * (1e-3 * area) ** 2}
+        hint = f"write it in m^2, {_alternatives(meant, tuple(max(weight, 1.0) / stress for stress in STRESSES))}"
+        yield _error(file, ("cable", number - 1, "area"), problem, hint)
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in cable.anchor):
         problem = f"is {max(map(abs, cable.anchor)):g} m from the origin, no robot is larger than 2 km"
         yield _error(
             file, ("cable", number - 1, "anchor"), problem, "write it in m, if this is in mm multiply by 0.001"
         )
+
+
+def _alternatives(meant: Mapping[str, float], plausible: Sequence[float]) -> str:
+    """What a number may be instead, each with what to write then; those within plausible bounds, if there are any."""
+    low, high = sorted(plausible)
+    likely = {what: value for what, value in meant.items() if low <= value <= high} or dict(list(meant.items())[:1])
+    return ", ".join(f"if this is {what} as {value:.6g}" for what, value in likely.items())
 
 
 def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Iterator[RobotFileError]:
