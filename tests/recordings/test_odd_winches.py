@@ -118,6 +118,22 @@ def test_a_winch_that_stands_while_its_rope_is_slack_is_no_fault() -> None:
     assert odd_winches(example("three"), replace(stands, tension=tension)) == ()
 
 
+@pytest.mark.parametrize("size", [0.03, 0.3])
+def test_a_platform_that_swings_on_soft_ropes_is_no_fault_of_winches_that_only_reel_in(size: float) -> None:
+    """Trapezoids of speed have a largest value that many samples share, and no other sign."""
+    robot, time = example("three"), np.arange(4001) / 100.0
+    position = np.array(robot.platform.start) + np.outer(np.interp(time, [10.0, 30.0], [0.0, 1.0]), [2.0, 0.0, 6.0])
+    lengths = np.linalg.norm(np.array(robot.anchors) - position[:, None], axis=2)
+    speed = -np.gradient(lengths, time, axis=0)
+    speed[:, CABLE - 1] = (
+        np.interp(time, [9.9, 10.1, 29.9, 30.1], [0.0, 1.0, 1.0, 0.0]) * speed.mean(axis=0)[CABLE - 1] * 2
+    )
+    swinging = position + size * np.outer(np.sin(6.0 * time), [2.0, 1.0, 3.0])
+    recording = Recording("log.csv", time, speed, np.full(lengths.shape, np.nan), swinging)
+    assert np.mean(speed[:, CABLE - 1] == speed[:, CABLE - 1].max()) > 0.3 and speed[:, CABLE - 1].min() >= 0.0
+    assert odd_winches(robot, recording) == ()
+
+
 def test_ropes_that_move_alike_may_have_one_speed() -> None:
     """Of a motion in a plane of symmetry, seen by a tracker whose unit is wrong by a third."""
     robot, time = example("three"), np.arange(4001) / 100.0

@@ -65,6 +65,15 @@ def test_a_rest_without_noise_is_no_copy_of_another_rest() -> None:
     assert shared(other, motion(1, noise=0.0)) < 0.02 * COUNT
 
 
+def test_values_that_recur_at_rest_are_no_copies() -> None:
+    """Two coordinates alone, in steps as wide as their noise."""
+    first, second = (
+        motion(seed).assign(**dict.fromkeys(("z", "tension_1", "tension_2", "tension_3"), np.nan)) for seed in (1, 2)
+    )
+    at_rest = [table[:AT_REST].round(4) for table in (first, second)]
+    assert shared(*at_rest) < 0.1 * AT_REST
+
+
 def test_recordings_of_different_outputs_have_nothing_in_common() -> None:
     tensions = motion(1).drop(columns=["x", "y", "z"])
     positions = motion(1).drop(columns=["tension_1", "tension_2", "tension_3"])

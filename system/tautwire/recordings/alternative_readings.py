@@ -133,6 +133,11 @@ class WindingReading:
             yield Mistake(f"the winches' clock is {offset} {side} the tracker's", remedy)
 
 
+def winding_as_declared(cable_count: int) -> WindingReading:
+    """Winches as the format has them."""
+    return WindingReading(signs=(1,) * cable_count, order=tuple(range(cable_count)))
+
+
 def convert(what: str, factor: float) -> str:
     """The remedy for columns in a unit of so many SI units."""
     return f"multiply {what} by {factor:.4g}"

@@ -63,10 +63,11 @@ def _named(name: str, unit: str, names: Collection[str]) -> ColumnName:
 
     A force along one axis alone, as of a wrench whose other numbers were not exported, is a tension.
     """
-    along = _FORCE_ALONG.fullmatch(name)
-    is_alone = along is not None and not any(along[1] + axis in names for axis in AXES if axis != along[2])
-    shown = along[1] if along and is_alone else name
-    words = f"{shown} [{unit}]" if unit and not unit_in_name(name) else shown
+    along, words = _FORCE_ALONG.fullmatch(name), name
+    if along and not any(along[1] + axis in names for axis in AXES if axis != along[2]):
+        words = along[1]
+    if unit and not unit_in_name(name):
+        words = f"{words} [{unit}]"
     return ColumnName(name, name if is_column_name(name) else None, words)
 
 

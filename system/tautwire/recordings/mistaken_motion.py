@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import AXES, Robot
-from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading
+from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading, winding_as_declared
 from .candidate_readings import (
     SAMPLE_INTERVALS,
     are_of_one_system,
@@ -49,8 +49,7 @@ class MotionReading:
     @property
     def is_of_winches(self) -> bool:
         """Whether winches are read otherwise than declared."""
-        winding = self.winding
-        return winding != WindingReading(signs=(1,) * len(winding.signs), order=tuple(range(len(winding.order))))
+        return self.winding != winding_as_declared(len(self.winding.order))
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class _RecordedMotion:
     @property
     def declared(self) -> WindingReading:
         """Winches as the format has them."""
-        return WindingReading(signs=(1,) * self.robot.cable_count, order=tuple(range(self.robot.cable_count)))
+        return winding_as_declared(self.robot.cable_count)
 
     def ropes(self, geometry: GeometryReading) -> RopeMotion:
         """Motion of the ropes in a geometry."""
@@ -104,10 +103,12 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     in_metres = _check_as_read(robot, replace(recording, position=recording.position / LENGTH_UNITS[unit]))
     if in_metres is None:
         return check
-    declared = WindingReading(signs=(1,) * robot.cable_count, order=tuple(range(robot.cable_count)))
-    others = [(each.geometry, each.winding, each.misfit) for each in in_metres.readings]
-    others += [(GeometryReading(), declared, in_metres.misfit)] if in_metres.misfit <= MAX_MISFIT else []
-    stated = [_reading(replace(each[0], stated_unit=unit), *each[1:], recording) for each in others]
+    readings = list(in_metres.readings)
+    if in_metres.misfit <= MAX_MISFIT:
+        readings.append(MotionReading(GeometryReading(), winding_as_declared(robot.cable_count), in_metres.misfit, ()))
+    stated = [
+        _reading(replace(each.geometry, stated_unit=unit), each.winding, each.misfit, recording) for each in readings
+    ]
     return replace(check, readings=_best([*check.readings, *stated], check.misfit))
 
 

@@ -15,8 +15,7 @@ from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingRead
 from .candidate_readings import SAMPLE_INTERVALS
 from .column_corrections import scaled
 from .frame_alignment import forward_kinematics_of_travel
-from .geometry_reading import recorded_poses
-from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MAX_MISFIT, MotionReading, check_motion
+from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, check_motion
 from .recording import Recording
 from .tracker_clock import MIN_GRID_INTERVAL, estimate_tracker_clock, least_travel_mismatch
 from .travel_correlation import distance_lags
@@ -29,7 +28,7 @@ WINCH_SPEED_UNITS = ("m/s", "mm/s", "cm/s", "m/min")
 MAX_MISTAKES = 3
 # Of their energy: travels that differ by more fit at no offset, which takes long to find out.
 MAX_TRAVEL_MISMATCH = 0.3
-MAX_OFFSETS = 3
+MAX_OFFSETS, MAX_FOLLOWED = 3, 20_000  # offsets of a clock, and samples of a log
 
 
 @dataclass(frozen=True)
@@ -95,32 +94,16 @@ def frame_mistakes(robot: Robot, log: Recording, tracker: Recording) -> tuple[tu
     rows = np.flatnonzero(np.isfinite(tracker.position[:, measured]).all(axis=1))
     if robot.platform.is_rigid_body or not measured[list(robot.axes_in_plane)].all() or not np.any(log.winch_speed):
         return ()
-    followed = forward_kinematics_of_travel(robot, log.wound_lengths())
+    log_rows = slice(None, None, 1 + log.sample_count // MAX_FOLLOWED)
+    followed = forward_kinematics_of_travel(robot, log.wound_lengths()[log_rows])
     shown, start = np.where(measured, tracker.position[rows], 0.0), tracker.time[rows[0]]
-    interval = max(MIN_GRID_INTERVAL, *(float(np.median(np.diff(each.time))) for each in (log, tracker)))
-    lags = distance_lags((tracker.time[rows], shown), (log.time, followed), interval)
-    readings = [reading for lag in lags[:MAX_OFFSETS] for reading in _of_frame(robot, log, tracker, float(lag + start))]
+    paths = (tracker.time[rows], shown), (log.time[log_rows], followed)
+    lags = distance_lags(*paths, max(MIN_GRID_INTERVAL, *(float(np.median(np.diff(times))) for times, _ in paths)))
+    checks = (check_motion(robot, _merged(log, tracker, start + lag)) for lag in lags[:MAX_OFFSETS])
+    readings = [reading for check in checks if check for reading in check.readings if not reading.is_of_winches]
     best = min((reading.misfit for reading in readings), default=np.inf)
-    fitting = [each for each in readings if each.misfit <= min(MAX_MISFIT, EQUAL_RATIO * best + EQUAL_DIFFERENCE)]
+    fitting = [each for each in readings if each.misfit <= EQUAL_RATIO * best + EQUAL_DIFFERENCE]
     return tuple(dict.fromkeys(tuple(replace(m, is_of_tracker=True) for m in each.mistakes) for each in fitting))
-
-
-def _of_frame(robot: Robot, log: Recording, tracker: Recording, offset: float) -> list[MotionReading]:
-    """Readings of the tracker's frame alone near an offset of its clock, which then follows from each of them."""
-    readings = []
-    for rough in _frames(robot, log, tracker, offset):
-        read = replace(tracker, position=rough.geometry.positions(robot, recorded_poses(tracker)))
-        try:
-            clock = estimate_tracker_clock(robot, log, read)
-        except RecordingError:
-            continue
-        readings += _frames(robot, log, tracker, clock.offset)
-    return readings
-
-
-def _frames(robot: Robot, log: Recording, tracker: Recording, offset: float) -> list[MotionReading]:
-    check = check_motion(robot, _merged(log, tracker, offset))
-    return [] if check is None else [reading for reading in check.readings if not reading.is_of_winches]
 
 
 def _merged(log: Recording, tracker: Recording, offset: float) -> Recording:

@@ -15,6 +15,8 @@ from .motion_regression import centred, moving_rows
 from .recording import Recording
 
 Array = NDArray[np.float64]
+# The likely cause, as a clause, and what mends it.
+Texts = tuple[str, str]
 
 # Rms of what a rope's length misses beside a constant and a scale, over that of its motion: stretch, drums and backlash
 # stay below.
@@ -24,9 +26,12 @@ LEAST_MOTION = 0.3
 INLIER_QUANTILE = 0.95
 # A cause leaves at most this share of the misfit, and of the cable's motion.
 MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
+MAX_MOVED = 2.0  # of an exit point's distance from the start
 MAX_GAP_INTERVALS = 5.0
 DRUM_SCALES = (0.7, 1.4)
-MIN_HELD_SAMPLES, MIN_CLIPPED_SHARE, MIN_TAUT_SHARE = 20, 0.03, 0.2
+MIN_HELD_SAMPLES, MIN_TAUT_SHARE = 20, 0.2
+# Of samples, and of the rope's speed to the one that is recorded in them.
+MIN_CLIPPED_SHARE, MIN_CLIPPED_RATIO = 0.03, 1.2
 SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
 
 
@@ -85,16 +90,12 @@ def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
     travel = _Travel(part, rows, lengths, centred(part.wound_lengths()[rows]))
     misfits = [travel.misfit(cable) for cable in range(part.cable_count)]
     odd = sorted((cable for cable, misfit in enumerate(misfits) if misfit > MAX_MISFIT), key=lambda c: -misfits[c])
-    # What a delay leaves is proportional to the speed.
-    late = [cable for cable in odd if travel.misfit(cable, part.winch_speed[rows, cable]) <= MAX_MISFIT]
-    causes = ((cable, _fault(travel, cable)) for cable in odd if cable not in late)
-    faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in causes if texts]
-    # Where every exit point seems to be wrong it is another robot, or another frame.
-    if not faults and len(odd) < part.cable_count:
-        steady = [cable for cable in odd if travel.misfit(cable, travel.drift) > MAX_MISFIT]
-        points = ((cable, _exit_point(robot, travel, cable)) for cable in steady)
-        faults = [OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in points if texts]
-    return tuple(faults[:MAX_TOLD])
+    told = {cable: texts for cable in odd if (texts := _fault(travel, cable))}
+    # Where no other cable follows its winch it is another robot or frame, or the platform swings.
+    others = [misfit for cable, misfit in enumerate(misfits) if cable not in odd]
+    if not told and max(others, default=1.0) <= MAX_SHARE_LEFT:
+        told = {cable: texts for cable in odd if (texts := _exit_point(robot, travel, cable))}
+    return tuple(OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in told.items())[:MAX_TOLD]
 
 
 def _longest_part(recording: Recording) -> Recording:
@@ -103,37 +104,26 @@ def _longest_part(recording: Recording) -> Recording:
     return recording.part(*max(pairwise(edges), key=lambda rows: rows[1] - rows[0]))
 
 
-def _fault(travel: _Travel, cable: int) -> tuple[str, str] | None:
+def _fault(travel: _Travel, cable: int) -> Texts | None:
     """The fault of a winch's column, as a clause, and what mends it; None where none is seen."""
+    faults = (_copied, _held, _clipped, _wrapped, _unsigned, _jump)
+    return next((texts for fault in faults if (texts := fault(travel, cable))), None)
+
+
+def _copied(travel: _Travel, cable: int) -> Texts | None:
+    """One speed in two columns whose ropes move differently."""
     speeds, name = travel.recording.winch_speed, f"winch_speed_{cable + 1}"
-    speed = speeds[:, cable]
     for other in range(speeds.shape[1]):
         differ = np.sqrt(np.mean((travel.lengths[:, cable] - travel.lengths[:, other]) ** 2))
-        if differ > MAX_MISFIT * travel.motion[cable] and np.any(speed) and np.array_equal(speed, speeds[:, other]):
+        if differ > MAX_MISFIT * travel.motion[cable] and np.array_equal(speeds[:, cable], speeds[:, other]):
             return f"{name} repeats winch_speed_{other + 1}", f"record {name}"
-    if held := _held_stretch(travel, cable):
-        first, last = (f"{travel.recording.time[row]:.5g}" for row in held)
-        return f"{name} stays at {speed[held[0]]:.4g} from {first} to {last} s", f"record {name}, or cut that part out"
-    for limit in (speed.max(), speed.min()):
-        count = int(np.count_nonzero(speed == limit))
-        if limit and count > MIN_CLIPPED_SHARE * len(speed):
-            return f"{name} is clipped at {limit:.4g} in {count} samples", f"record {name} in its whole range"
-    if np.max(np.abs(speed)) > MIN_SPIKE_RATIO * (usual := float(np.quantile(np.abs(speed), SPEED_QUANTILE))) > 0.0:
-        cause = f"{name} reaches {np.max(np.abs(speed)):.3g} m/s, and stays below {usual:.3g} in 99 % of all samples"
-        return f"{cause}, as where counts wrap", f"leave these samples empty, or record rope_length_{cable + 1}"
-    if np.any(speed) and not np.any(speed < 0.0):
-        return f"{name} is never negative", f"record {name} with its sign, negative where the rope pays out"
-    if jump := _jump(travel, cable):
-        time, length = jump
-        cause = f"its rope is {abs(length):.3g} m {'shorter' if length < 0.0 else 'longer'} from {time:.5g} s on"
-        return f"{cause}, as where counts are lost, samples left out or the tracker moved", "cut the recording there"
     return None
 
 
-def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
-    """First and last row of the longest stretch with one speed in which a taut rope's length changes otherwise."""
-    is_held = np.concatenate([[0], (np.diff(travel.recording.winch_speed[:, cable]) == 0.0).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(is_held))
+def _held(travel: _Travel, cable: int) -> Texts | None:
+    """One speed for long while a taut rope's length changes otherwise."""
+    speed, name = travel.recording.winch_speed[:, cable], f"winch_speed_{cable + 1}"
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.diff(speed) == 0.0).astype(int), [0]])))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
     for first, last in stretches:
         if last - first < MIN_HELD_SAMPLES:
@@ -144,7 +134,9 @@ def _held_stretch(travel: _Travel, cable: int) -> tuple[int, int] | None:
         # A rope that is longer than its line may be slack, unless its load cell says otherwise.
         shorter = missed[0] - missed.min() if _is_taut(travel.recording.tension[first:last, cable]) else 0.0
         if max(missed.max() - missed[0], shorter) > travel.motion[cable]:
-            return first, last
+            begin, end = (f"{travel.recording.time[row]:.5g}" for row in (first, last))
+            cause = f"{name} stays at {speed[first]:.4g} from {begin} to {end} s"
+            return cause, f"record {name}, or cut that part out"
     return None
 
 
@@ -153,26 +145,62 @@ def _is_taut(tension: Array) -> bool:
     return bool(measured.size and measured.min() > MIN_TAUT_SHARE * np.median(measured))
 
 
-def _jump(travel: _Travel, cable: int) -> tuple[float, float] | None:
-    """Time (s) and size (m) of one step that explains what a rope's length misses."""
+def _clipped(travel: _Travel, cable: int) -> Texts | None:
+    """A largest or smallest speed in many samples, in which the rope's length changes faster."""
+    speed, name = travel.recording.winch_speed[:, cable], f"winch_speed_{cable + 1}"
+    rate = -np.gradient(travel.lengths[:, cable], travel.recording.time[travel.rows])
+    for limit in (float(speed.max()), float(speed.min())):
+        is_clipped = speed == limit
+        seen = rate[is_clipped[travel.rows]]
+        is_frequent = bool(np.mean(is_clipped) > MIN_CLIPPED_SHARE and seen.size and limit)
+        if is_frequent and np.median(seen) / limit > MIN_CLIPPED_RATIO:
+            cause = f"{name} is clipped at {limit:.4g} in {np.count_nonzero(is_clipped)} samples"
+            return cause, f"record {name} in its whole range"
+    return None
+
+
+def _wrapped(travel: _Travel, cable: int) -> Texts | None:
+    """A few speeds far beyond all others, as differences of counts that begin anew have them."""
+    speed, name = np.abs(travel.recording.winch_speed[:, cable]), f"winch_speed_{cable + 1}"
+    usual = float(np.quantile(speed, SPEED_QUANTILE))
+    if not speed.max() > MIN_SPIKE_RATIO * usual > 0.0:
+        return None
+    cause = f"{name} reaches {speed.max():.3g} m/s, and stays below {usual:.3g} in 99 % of all samples"
+    return f"{cause}, as where counts wrap", f"leave these samples empty, or record rope_length_{cable + 1}"
+
+
+def _unsigned(travel: _Travel, cable: int) -> Texts | None:
+    """No speed below zero though the rope becomes longer on its way."""
+    speed, length = travel.recording.winch_speed[:, cable], travel.lengths[:, cable]
+    paid_out = float(np.max(length - np.minimum.accumulate(length)))
+    if np.any(speed < 0.0) or paid_out < travel.motion[cable]:
+        return None
+    name = f"winch_speed_{cable + 1}"
+    return f"{name} is never negative", f"record {name} with its sign, negative where the rope pays out"
+
+
+def _jump(travel: _Travel, cable: int) -> Texts | None:
+    """One step that explains what a rope's length misses, beside a drift."""
     missed = (travel.lengths + travel.wound)[:, cable]
     before, after = (_running_mean(each) for each in (missed, missed[::-1]))
     counts = np.arange(1, len(missed))
     steps = after[::-1][1:] - before[:-1]
     row = int(np.argmax(steps**2 * counts * (len(missed) - counts))) + 1
     is_after = (np.arange(len(missed)) >= row).astype(float)
-    misfits = travel.misfit(cable, travel.drift, is_after), travel.misfit(cable, travel.drift)
-    is_explained = _is_explained(*misfits)
-    return (float(travel.recording.time[travel.rows[row]]), float(steps[row - 1])) if is_explained else None
+    if not _is_explained(travel.misfit(cable, travel.drift, is_after), travel.misfit(cable, travel.drift)):
+        return None
+    length, time = float(steps[row - 1]), travel.recording.time[travel.rows[row]]
+    cause = f"its rope is {abs(length):.3g} m {'shorter' if length < 0.0 else 'longer'} from {time:.5g} s on"
+    return f"{cause}, as where counts are lost, samples left out or the tracker moved", "cut the recording there"
 
 
 def _running_mean(values: Array) -> Array:
     return np.asarray(np.cumsum(values) / np.arange(1, len(values) + 1))
 
 
-def _exit_point(robot: Robot, travel: _Travel, cable: int) -> tuple[str, str] | None:
-    """The exit point with which a rope's length follows its winch; None of a rigid platform, or where none does."""
-    if robot.platform.is_rigid_body:
+def _exit_point(robot: Robot, travel: _Travel, cable: int) -> Texts | None:
+    """The exit point with which a rope's length follows its winch; None of a rigid platform, or where a drift does."""
+    if robot.platform.is_rigid_body or travel.misfit(cable, travel.drift) <= MAX_MISFIT:
         return None
     declared, poses = np.array(robot.anchors[cable], dtype=float), recorded_poses(travel.recording, travel.rows)
     free = list(robot.axes_in_plane)
@@ -187,7 +215,8 @@ def _exit_point(robot: Robot, travel: _Travel, cable: int) -> tuple[str, str] | 
 
     fit = least_squares(missed, np.zeros(len(free)), loss="soft_l1", f_scale=0.1 * travel.motion[cable])
     left = float(np.sqrt(np.mean(missed(fit.x) ** 2))) / travel.motion[cable]
-    if not _is_explained(left, travel.misfit(cable)):
+    reach = MAX_MOVED * float(np.linalg.norm(declared - robot.platform.start))
+    if not _is_explained(left, travel.misfit(cable)) or np.linalg.norm(fit.x) > reach:
         return None
     declared[free] += fit.x
     written = ", ".join(f"{coordinate:.4g}" for coordinate in declared)

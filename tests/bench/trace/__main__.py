@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from tests.support.robots import EXAMPLES
@@ -79,8 +80,11 @@ def write(folder: Path) -> None:
 
     Of each case the newest answer counts; the page tells by which versions of the tracer.
     """
-    sections = finished_sections(read_lines(folder / "results.jsonl"))
+    lines = read_lines(folder / "results.jsonl")
+    sections = finished_sections(lines)
     path = ROOT / "docs" / "tracer.md"
+    if document.EXACT[0] in sections:
+        save(confusion_figure(scored(main_cases(), finished(main_cases(), lines))), str(path.with_name(PICTURE)))
     if sections:
         old = path.read_text(encoding="utf-8") if path.exists() else ""
         path.write_text(document.page(old, sections), encoding="utf-8")
@@ -90,7 +94,7 @@ def write(folder: Path) -> None:
 def finished_sections(lines: Sequence[Line]) -> dict[str, str]:
     """The page's sections, heading to text, of the parts whose every case has an answer."""
     parts: tuple[tuple[Sequence[Case], Callable[[Sequence[Scored]], dict[str, str]]], ...] = (
-        (main_cases(), _exact_with_picture),
+        (main_cases(), partial(document.exact, picture=PICTURE)),
         (alarm_cases(_alarms_in(lines, f"{ALARM}-")), document.exact_alarms),
         (lifelike_cases(), document.lifelike),
         (lifelike_alarm_cases(_alarms_in(lines, LIFELIKE_ALARM)), document.lifelike_alarms),
@@ -102,11 +106,6 @@ def finished_sections(lines: Sequence[Line]) -> dict[str, str]:
         if answers and len(answers) == len(cases):
             sections |= sections_of(answers)
     return sections
-
-
-def _exact_with_picture(answers: Sequence[Scored]) -> dict[str, str]:
-    save(confusion_figure(answers), str(ROOT / "docs" / PICTURE))
-    return document.exact(answers, PICTURE)
 
 
 def _alarms_in(lines: Sequence[Line], prefix: str) -> int:
