@@ -160,3 +160,18 @@ def test_commands_tell_of_another_robots_recording(
     assert "28.1 m from the start in the robot file" in said
     assert list(tmp_path.iterdir()) == []
     assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_lengths_in_the_columns_of_speeds_are_told(unit: float) -> None:
+    recording = of("three")
+    lengths = (70.0 - recording.wound_lengths()) / unit
+    (error,) = recording_mistakes(THREE, recording.with_winch_speed(lengths))
+    assert "vary as the lengths of the ropes, not their rates" in error.problem
+    assert f"name them rope_length_1 to rope_length_3; 1 of theirs is about {unit:g} m of rope" in error.hint
+
+
+def test_times_that_count_samples_are_told_with_the_interval() -> None:
+    recording = of("three")
+    (error,) = recording_mistakes(THREE, replace(recording, time=np.arange(recording.sample_count) + 0.0))
+    assert "as the number of a sample does" in error.problem and "about 0.00999 by" in error.hint

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
+from tautwire.recordings.alternative_readings import LENGTH_UNITS
 from tautwire.recordings.consistency import recording_mistakes, require_plausible
 from tautwire.recordings.geometry_reading import recorded_poses
 from tautwire.recordings.mistaken_motion import MAX_MISFIT, check_motion
@@ -88,6 +89,7 @@ MISTAKES: dict[str, tuple[Change, str, str]] = {
     "time in days": (time_in(86_400.0), "if time is in d", "multiply time by 8.64e+04"),
     "counts a second": (speeds(1.3e4), "1 of theirs is 7.", "or better by the factor that follows"),
     "turns a second": (speeds(1.0 / (2.0 * np.pi * RADIUS)), "m if in turns/s", "what is recorded in one turn"),
+    "another gear": (speeds(0.625), "or as of gears, drums or intervals of time 1.", "or better by the factor"),
     "positions in inches": (positions(1.0 / 0.0254), "if x, y, z are in in", "multiply x, y, z by 0.0254"),
     "positions in feet": (positions(1.0 / 0.3048), "if x, y, z are in ft", "multiply x, y, z by 0.3048"),
     "one axis in mm": (positions([1.0, 1.0, 1e3]), "if z is in mm", "multiply z by 0.001"),
@@ -144,6 +146,26 @@ def test_a_rope_length_in_mm_is_told_by_its_column() -> None:
     recording = replace(recording, rope_length=-recording.wound_lengths())
     (error,) = recording_mistakes(robot, recording)
     assert "rope_length_1 to rope_length_3 are in mm" in error.problem
+
+
+def with_anchors(robot: Robot, change: Callable[[np.ndarray], np.ndarray]) -> Robot:
+    anchors = [tuple(change(np.array(cable.anchor)).tolist()) for cable in robot.cables]
+    cables = tuple(replace(cable, anchor=anchor) for cable, anchor in zip(robot.cables, anchors, strict=True))
+    return replace(robot, cables=cables)
+
+
+@pytest.mark.parametrize("unit", ["ft", "in"])
+def test_anchors_in_feet_are_told_beside_a_start_in_metres(unit: str) -> None:
+    robot, recording = shipped("three")
+    size = LENGTH_UNITS[unit]
+    (error,) = recording_mistakes(with_anchors(robot, lambda anchor: anchor / size), recording)
+    assert f"anchors in the robot file are in {unit}" in error.problem
+
+
+def test_anchors_with_another_origin_than_the_start_are_told() -> None:
+    robot, recording = shipped("three")
+    (error,) = recording_mistakes(with_anchors(robot, lambda anchor: anchor - [28.0, 0.0, 5.0]), recording)
+    assert "another origin, about [-28" in error.problem and "subtract it from the anchors" in error.hint
 
 
 @pytest.mark.parametrize("with_start", [False, True])

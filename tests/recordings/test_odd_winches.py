@@ -58,7 +58,12 @@ def wrapped(time: np.ndarray, speeds: np.ndarray) -> None:
     speeds[[900, 1700, 2500], CABLE - 1] += [400.0, -900.0, 700.0]
 
 
+def one_in_mm(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[:, CABLE - 1] *= 1e3
+
+
 FAULTS: dict[str, tuple[Change, str]] = {
+    "another unit": (one_in_mm, "winch_speed_2 is in mm/s"),
     "stuck": (stuck, "winch_speed_2 stays at 0 from 12 to 40 s"),
     "copied": (copied, "winch_speed_2 repeats winch_speed_3"),
     "clipped": (clipped, "is clipped at"),

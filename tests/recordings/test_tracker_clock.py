@@ -106,6 +106,12 @@ def test_a_tracker_of_another_motion_fits_at_no_offset() -> None:
     assert "units, axes and origin" in error.hint
 
 
+def test_a_time_that_counts_frames_is_told() -> None:
+    tracker = tracker_along(wandering, TIMES)
+    error = refusal(log_along(ROBOT, wandering, 20.0), replace(tracker, time=np.arange(len(TIMES)) + 41.0))
+    assert "as the number of a frame does" in error.problem and "the s between frames as its factor" in error.hint
+
+
 def test_too_little_overlap_is_refused() -> None:
     error = refusal(log_along(ROBOT, wandering, 20.0), tracker_along(wandering, TIMES + 19.0))
     assert "at no offset" in error.problem

@@ -39,6 +39,7 @@ def test_shipped_robots_are_plausible(name: str) -> None:
         ({"area": 0.004}, "area", "the diameter in m as 1.257e-05"),
         ({"anchor": (0.0, 0.0, 12000.0)}, "anchor", "in mm multiply by 0.001"),
         ({"modulus": 1e9, "damping": 39e9}, "damping", "write it in Pa s"),
+        ({"anchor_uncertainty": 2.0}, "anchor_uncertainty", "in mm multiply by 0.001"),
     ],
 )
 def test_each_cable_is_told_with_the_unit(changes: dict[str, Any], key: str, hint: str) -> None:

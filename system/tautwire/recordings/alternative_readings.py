@@ -20,6 +20,7 @@ from .recording import Recording
 from .units import UNITS
 
 DRUM_RADII = (0.005, 0.5)  # m
+MAX_DRUM_RATIO = 4.0  # of a drum and its gear to those that were taken for it
 NEGATE = "multiply by -1"
 REORDER = "rename the columns in this order"
 
@@ -27,7 +28,9 @@ REORDER = "rename the columns in this order"
 TIME_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["time"]}
 SPEED_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["speed"]}
 LENGTH_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["length"]}
-ANCHOR_UNITS = ("m", "cm", "mm")
+ANCHOR_UNITS = ("m", "cm", "mm", "in", "ft")
+# On a rigid platform.
+ATTACHMENT_UNITS = ("m", "cm", "mm")
 
 
 @dataclass(frozen=True)
@@ -168,5 +171,8 @@ def _factor_text(names: list[str], ratio: float, are_lengths: bool) -> str:
     parts += (
         [f"{100.0 * abs(error):.2g} % {'more' if error > 0.0 else 'less'} than one {near}"] if abs(error) < 0.1 else []
     )
-    parts += [f"as of angles of drums with a radius of {likely}" if likely else "as of an encoder's counts"]
+    is_gear = 1.0 / MAX_DRUM_RATIO < ratio < MAX_DRUM_RATIO
+    causes = [f"as of angles of drums with a radius of {likely}"] if likely else []
+    causes += [f"as of gears, drums or intervals of time {ratio:.3g} times those that were taken"] if is_gear else []
+    parts += [" or ".join(causes) if causes else "as of an encoder's counts"]
     return f"{_range_text(names)} are not {kind} of ropes in {unit}: {', '.join(parts)}"

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from ..robot.schema import Robot
-from .alternative_readings import ANCHOR_UNITS, LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, WindingReading
+from .alternative_readings import ANCHOR_UNITS, ATTACHMENT_UNITS, LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, WindingReading
 from .geometry_reading import GeometryReading, QuaternionReading
+from .motion_regression import moves_along_two_axes
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ MIN_UNIT_RATIO, MAX_UNIT_ERROR = 1.25, 0.01
 MAX_RATIO_SPREAD = 0.03
 # Ratios of geometric to wound lengths that drums and ropes that give may have, whatever the unit.
 GIVING_ROPES = (0.5, 4.0)
+# Beyond the ratio it is a gear's if it leaves this misfit at most.
+MIN_GEAR_RATIO, MAX_GEAR_MISFIT = 1.25, 0.01
 LONG_TIME_UNITS = ("min", "h", "d")
 SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 
@@ -39,9 +42,9 @@ def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
         if unit != odd_unit:
             yield GeometryReading(unit, odd_axis=odd_axis, odd_unit=odd_unit)
     if robot.platform.is_rigid_body:
-        for unit in ANCHOR_UNITS:
+        for unit in ATTACHMENT_UNITS:
             yield from pose_readings(robot, unit)
-        for unit, attachment_unit in product(ANCHOR_UNITS, ANCHOR_UNITS[1:]):
+        for unit, attachment_unit in product(ATTACHMENT_UNITS, ATTACHMENT_UNITS[1:]):
             yield GeometryReading(unit, attachment_unit=attachment_unit)
 
 
@@ -82,10 +85,19 @@ def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[
         sizes = [TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit] for time_unit, speed_unit in units]
         is_unit = any(abs(ratio / size - 1.0) <= MAX_UNIT_ERROR for size in sizes)
         is_of_ropes = GIVING_ROPES[0] < ratio < GIVING_ROPES[1]
+        is_of_ropes &= not _is_of_gear(lengths, np.array(signs) * wound[:, order], ratio)
         if not is_unit and not is_of_ropes and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio:
             for time_unit, size in TIME_UNITS.items():
                 if SAMPLE_INTERVALS[0] <= interval * size <= SAMPLE_INTERVALS[1]:
                     yield WindingReading(time_unit, None, signs, order, ratio / size)
+
+
+def _is_of_gear(lengths: Array, wound: Array, ratio: float) -> bool:
+    """Whether a ratio of centred lengths to travel, each (N, n), is that of a gear, and not what ropes give."""
+    if 1.0 / MIN_GEAR_RATIO < ratio < MIN_GEAR_RATIO:
+        return False
+    missed = np.linalg.norm(lengths + ratio * wound)
+    return bool(missed <= MAX_GEAR_MISFIT * np.linalg.norm(lengths)) and moves_along_two_axes(lengths)
 
 
 def are_of_one_system(geometry: GeometryReading, winding: WindingReading) -> bool:

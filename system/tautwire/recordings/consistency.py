@@ -14,7 +14,7 @@ from .geometry_reading import GeometryReading, recorded_poses
 from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
 from .mistaken_tensions import TensionCheck, check_tensions
-from .motion_regression import length_regression
+from .motion_regression import centred, length_regression
 from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 
@@ -30,6 +30,8 @@ MAX_WINCH_SPEED, SPEED_QUANTILE = 60.0, 0.99
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
 MAX_SAMPLE_INTERVAL = 0.5  # s
+# Rms of what lengths in the columns of speeds miss, over that of the geometric ones.
+MAX_LENGTH_MISFIT = 0.1
 # Their contributions to readings and points, and beside these to forces, are not computed here.
 EFFECTS_ON_POSES = frozenset(
     ("frame", "sensor_delay", "sensor_gain", "sensor_offset", "attachment", "centre_of_mass"),
@@ -65,17 +67,16 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     motion = check_motion(robot, recording)
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
-    if motion is not None and motion.misfit > MAX_MISFIT and (error := row_number_error(robot, recording)):
+    is_odd = motion is not None and motion.misfit > MAX_MISFIT
+    if is_odd and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
         return (error,)
     if motion is not None and motion.readings:
         errors.append(_motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
-    elif travel is not None:
-        return (travel,)
-    elif error := speed_error(recording) or start_orientation_error(robot, recording):
+    elif is_odd and (odd := odd_winches(robot, recording)):
+        errors += [_odd_winch_error(recording, each) for each in odd]
+    elif error := travel or speed_error(recording) or start_orientation_error(robot, recording):
         return (error,)
-    elif motion is not None and motion.misfit > MAX_MISFIT:
-        errors += [_odd_winch_error(recording, each) for each in odd_winches(robot, recording)]
     if robot.formulas or declared & EFFECTS_ON_FORCES:
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
@@ -119,6 +120,23 @@ def row_number_error(robot: Robot, recording: Recording) -> RecordingError | Non
     problem = "time rises by exactly 1 from row to row, as the number of a sample does, and winch travel does not match"
     hint = f"its factor is the time between samples in s, about {interval:.3g} by the winch travel"
     return RecordingError(recording.path, problem, f"declare time in [recording.columns]: {hint}")
+
+
+def length_column_error(robot: Robot, recording: Recording) -> RecordingError | None:
+    """The error of winch speeds that vary as the lengths of the ropes do; None of others."""
+    regression = length_regression(robot, recording)
+    if regression is None or recording.rope_lengths:
+        return None
+    columns = centred(recording.winch_speed[regression.rows])
+    squares = np.sum(columns**2, axis=0)
+    slopes = np.sum(columns * regression.lengths, axis=0) / np.where(squares > 0.0, squares, np.inf)
+    missed = np.linalg.norm(regression.lengths - slopes * columns, axis=0)
+    if np.any(missed > MAX_LENGTH_MISFIT * np.linalg.norm(regression.lengths, axis=0)):
+        return None
+    scale = float(np.median(slopes))
+    problem = f"winch_speed_1 to winch_speed_{recording.cable_count} vary as the lengths of the ropes, not their rates"
+    hint = f"name them rope_length_1 to rope_length_{recording.cable_count}; 1 of theirs is about {scale:.2g} m of rope"
+    return RecordingError(recording.path, problem, hint)
 
 
 def speed_error(recording: Recording) -> RecordingError | None:

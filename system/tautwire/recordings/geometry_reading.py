@@ -190,7 +190,7 @@ class GeometryReading:
             cause = f"x, y, z have another origin, about [{offset}] m in the robot file's frame"
             shifts = zip(AXES, self.origin, strict=True)
             corrections = tuple(ColumnCorrection(axis, shift=shift) for axis, shift in shifts if shift)
-            yield Mistake(cause, "add that vector", corrections)
+            yield Mistake(cause, "add that vector, or subtract it from the anchors if theirs is another", corrections)
         if self.is_centre_of_mass:
             cause = "x, y, z are those of the centre of mass"
             remedy = "record the frame's origin, or subtract centre_of_mass from all attachments and from itself"

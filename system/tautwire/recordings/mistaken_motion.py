@@ -19,7 +19,7 @@ from .candidate_readings import (
 )
 from .frame_alignment import aligned_frames
 from .geometry_reading import GeometryReading, RecordedPoses, recorded_poses
-from .motion_regression import RopeMotion, centred, moving_rows, quasi_static_units, rope_motion
+from .motion_regression import RopeMotion, centred, moves_along_two_axes, moving_rows, quasi_static_units, rope_motion
 from .recording import Recording
 
 Array = NDArray[np.float64]
@@ -33,6 +33,8 @@ MIN_POSE_MISFIT = 0.005
 EQUAL_RATIO, EQUAL_DIFFERENCE = 1.5, 0.005
 # Share of the robot's size that positions of another origin begin away from the declared start.
 MIN_START_SHARE = 0.02
+# Of anchors that lie in a frame of their own, in which the start says nothing: with it at most, and at least without.
+MAX_FRAME_MISFIT, MIN_FRAME_MISFIT = 0.01, 0.2
 MIN_CLOCK_OFFSET, MAX_CLOCK_OFFSET = 0.5, 10.0  # s
 
 
@@ -137,8 +139,11 @@ def _check_as_read(robot: Robot, recording: Recording) -> MotionCheck | None:
         clocks = _clock_readings(motion)
         readings += [_reading(GeometryReading(), winding, error, recording) for winding, error in clocks]
         frames = aligned_frames(robot, motion.poses, motion.wound)
-        framed = [_declared_reading(motion, frame) for frame in frames if _is_start_nearer(motion, frame)]
-        readings += [reading for reading in framed if reading.misfit <= MAX_MISFIT]
+        framed = [_declared_reading(motion, frame) for frame in frames]
+        readings += [each for each in framed if each.misfit <= MAX_MISFIT and _is_start_nearer(motion, each.geometry)]
+        is_far = misfit >= MIN_FRAME_MISFIT and moves_along_two_axes(motion.ropes(GeometryReading()).lengths)
+        if is_far and not any(each.misfit <= MAX_FRAME_MISFIT for each in readings):
+            readings += [each for each in framed if each.misfit <= MAX_FRAME_MISFIT]
     return MotionCheck(misfit, _best(readings, misfit))
 
 

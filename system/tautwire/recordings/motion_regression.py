@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import AXES, Robot
-from .alternative_readings import ANCHOR_UNITS, TIME_UNITS, WindingReading
+from .alternative_readings import ANCHOR_UNITS, ATTACHMENT_UNITS, TIME_UNITS, WindingReading
 from .geometry_reading import GeometryReading, RecordedPoses, recorded_poses, turned, unturned
 from .recording import Recording
 from .white_noise_estimate import white_noise_deviation
@@ -21,6 +21,7 @@ MAX_QUASI_STATIC_SHARE = 0.5
 # Of squares of natural frequencies to the largest: in modes below, the platform swings and hardly stretches ropes.
 MIN_STRETCHING_RATIO = 1e-4
 MIN_MOTION_NOISE_RATIO = 20.0
+MIN_SECOND_MOTION = 0.05  # of singular values of motion, to the largest
 MAX_ROWS, ROWS_USED, MIN_ROWS = 8000, 1000, 10
 # Quantile of rows that count: the others may be outliers.
 INLIER_QUANTILE = 0.95
@@ -63,11 +64,12 @@ def rope_motion(robot: Robot, geometry: GeometryReading, poses: RecordedPoses) -
 
 @dataclass(frozen=True)
 class LengthRegression:
-    """Centred geometric rope lengths on centred wound ones, both (M, n) in m: their slopes and misfits, (n,).
+    """Centred geometric rope lengths on centred wound ones, both (M, n) in m, of ``rows``: slopes and misfits, (n,).
 
     A slope is the shortening by what was reeled in, 1 where both agree.
     """
 
+    rows: NDArray[np.int64]
     lengths: Array
     wound: Array
     slopes: Array
@@ -93,7 +95,7 @@ def length_regression(robot: Robot, recording: Recording) -> LengthRegression | 
     ]
     energies = np.sum(wound**2, axis=0)
     slopes = -np.sum(motion.lengths * wound, axis=0) / np.where(energies > 0.0, energies, np.nan)
-    return LengthRegression(motion.lengths, wound, slopes, np.array(misfits))
+    return LengthRegression(rows, motion.lengths, wound, slopes, np.array(misfits))
 
 
 def wound_lengths_in(rows: NDArray[np.int64], recording: Recording) -> Array:
@@ -128,6 +130,12 @@ def moving_rows(robot: Robot, recording: Recording) -> NDArray[np.int64] | None:
     return rows[:: max(1, rows.size // ROWS_USED)]
 
 
+def moves_along_two_axes(lengths: Array) -> bool:
+    """Whether centred lengths (M, n) vary along more than one direction: along another, ropes give otherwise."""
+    first, second = np.linalg.svd(lengths, compute_uv=False)[:2]
+    return bool(second >= MIN_SECOND_MOTION * first)
+
+
 def _moves(signals: Array, rows: NDArray[np.int64]) -> bool:
     """Whether signals (N, k) vary in these rows by far more than their noise."""
     moved = np.sqrt(np.mean(np.var(signals[rows][:, np.isfinite(signals).any(axis=0)], axis=0)))
@@ -155,7 +163,7 @@ def _lowest_frequency(robot: Robot, anchor_unit: str) -> float:
     """Lowest angular frequency that winches excite, rad/s; of a rigid platform with attachments in any unit."""
     if not robot.platform.is_rigid_body:
         return _lowest_natural_frequency(robot, GeometryReading(anchor_unit=anchor_unit))
-    readings = (GeometryReading(anchor_unit=anchor_unit, attachment_unit=unit) for unit in ANCHOR_UNITS)
+    readings = (GeometryReading(anchor_unit=anchor_unit, attachment_unit=unit) for unit in ATTACHMENT_UNITS)
     return max(_lowest_elastic_frequency(robot, reading) for reading in readings)
 
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..robot.schema import Robot
+from .alternative_readings import SPEED_UNITS, Mistake, convert, mistakes_text
+from .column_corrections import scaled
 from .geometry_reading import GeometryReading, recorded_poses
 from .motion_regression import centred, moving_rows
 from .recording import Recording
@@ -106,8 +108,19 @@ def _longest_part(recording: Recording) -> Recording:
 
 def _fault(travel: _Travel, cable: int) -> Texts | None:
     """The fault of a winch's column, as a clause, and what mends it; None where none is seen."""
-    faults = (_copied, _held, _clipped, _wrapped, _unsigned, _jump)
+    faults = (_other_unit, _copied, _held, _clipped, _wrapped, _unsigned, _jump)
     return next((texts for fault in faults if (texts := fault(travel, cable))), None)
+
+
+def _other_unit(travel: _Travel, cable: int) -> Texts | None:
+    """A unit of speed in which a rope's length follows its winch."""
+    length, wound, name = travel.lengths[:, cable], travel.wound[:, cable], f"winch_speed_{cable + 1}"
+    for unit, size in SPEED_UNITS.items():
+        left = float(np.sqrt(np.mean((length + size * wound) ** 2))) / travel.motion[cable]
+        if unit != "m/s" and _is_explained(left, travel.misfit(cable)):
+            mistake = Mistake(f"{name} is in {unit}", convert(name, size), scaled((name,), size, unit))
+            return mistakes_text([[mistake]], travel.recording)
+    return None
 
 
 def _copied(travel: _Travel, cable: int) -> Texts | None:

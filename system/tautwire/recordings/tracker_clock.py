@@ -38,12 +38,16 @@ STATE_OFFSET_HINT = "or state clock_offset in [recording.tracker]"
 class UnmatchedTravelError(RecordingError):
     """A tracker's positions that match the winch travel at no offset of its clock."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, tracker: Recording) -> None:
+        problem = "its positions match the winch travel at no offset of its clock"
         hint = (
             "check units, factors and signs of the winches in [recording.columns], units, axes and origin of the "
             f"tracker, and that it is that of this motion, {STATE_OFFSET_HINT}"
         )
-        super().__init__(path, "its positions match the winch travel at no offset of its clock", hint)
+        if np.all(np.diff(tracker.time) == 1.0):
+            problem += ", and its time rises by exactly 1 from row to row, as the number of a frame does"
+            hint = f"declare time in [recording.tracker.columns] with the s between frames as its factor, or {hint}"
+        super().__init__(tracker.path, problem, hint)
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     alignments = [fit.refined(offset) for offset in _candidate_offsets(log, times, lengths)]
     fitting = sorted((each for each in alignments if each and each.misfit <= MAX_MISFIT), key=lambda each: each.misfit)
     if not fitting:
-        raise UnmatchedTravelError(tracker.path)
+        raise UnmatchedTravelError(tracker)
     best = fitting[0]
     _require_unique(tracker.path, best, fitting[1:])
     if best.clock.deviation > MAX_DEVIATION:

@@ -14,6 +14,7 @@ MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
 # A rope thicker than 16 mm is there to carry more than this: else its area is a diameter.
 MIN_THICK_AREA, MIN_STRESS, MIN_STRAIN = 2e-4, 1e6, 2e-4  # m^2, Pa
 MAX_COORDINATE = 2000.0  # m
+MAX_UNCERTAINTY_RATIO = 0.1  # of a point, by its distance to the farthest exit point
 MAX_GRAVITY, STANDARD_GRAVITY = 30.0, 9.80665  # m/s^2
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
 MAX_SIZE_RATIO = 10.0  # of the platform, by the distance from it to the farthest exit point
@@ -25,16 +26,16 @@ DAMPING_HINT = "write it in Pa s, as modulus times the rope's time of retardatio
 def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     """Errors for numbers that no cable robot has, each with the unit that was probably meant.
 
-    They are modulus, area, damping and anchors of the cables, and what makes a rigid platform larger than its frame;
-    where each alone is plausible, an upper bound of the highest modal frequency, ``f = sqrt(sum_i E_i A_i / L_i / m) /
-    2 pi``, and of its damping ratio, ``pi f max_i eta_i / E_i``.
+    They are modulus, area, damping and anchors of the cables, points that are uncertain by a tenth of the robot, and
+    what makes a rigid platform larger than its frame; where each alone is plausible, an upper bound of the highest
+    modal frequency, ``f = sqrt(sum_i E_i A_i / L_i / m) / 2 pi``, and of its damping ratio, ``pi f max_i eta_i / E_i``.
     """
     weight = robot.platform.mass * robot.gravity / robot.cable_count
     load = max(weight, robot.tension.preferred if robot.tension else 0.0)
     errors = []
     for number, cable in enumerate(robot.cables, 1):
         errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
-    errors += [*_platform_errors(robot, file), *_gravity_errors(robot, file)]
+    errors += [*_platform_errors(robot, file), *_uncertainty_errors(robot, file), *_gravity_errors(robot, file)]
     yield from errors
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
         problem = f"is {max(map(abs, robot.platform.start)):g} m from the origin, no robot is larger than 2 km"
@@ -102,7 +103,7 @@ def _gravity_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
 def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     """Errors for attachments, centre of mass and radius of gyration far beyond the exit points."""
     platform = robot.platform
-    reach = MAX_SIZE_RATIO * max(math.dist(cable.anchor, platform.start) for cable in robot.cables)
+    reach = MAX_SIZE_RATIO * _frame_radius(robot)
     points = [(("cable", index, "attachment"), cable.attachment) for index, cable in enumerate(robot.cables)]
     for key_path, point in [*points, (("platform", "centre_of_mass"), platform.centre_of_mass)]:
         distance = math.hypot(*point)
@@ -115,6 +116,25 @@ def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
         problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {reach:.3g}"
         hint = "write it in kg m^2, if this is in kg mm^2 multiply by 1e-6"
         yield _error(file, ("platform", "inertia"), problem, hint)
+
+
+def _uncertainty_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Errors for exit points and attachments that are known to no better than a tenth of the robot."""
+    limit = MAX_UNCERTAINTY_RATIO * _frame_radius(robot)
+    for index, cable in enumerate(robot.cables):
+        deviations = {
+            "anchor_uncertainty": cable.anchor_uncertainty,
+            "attachment_uncertainty": cable.attachment_uncertainty,
+        }
+        for key, deviation in deviations.items():
+            if deviation > limit:
+                problem = f"is {deviation:g} m, more than a tenth of this robot"
+                yield _error(file, ("cable", index, key), problem, "write it in m, if this is in mm multiply by 0.001")
+
+
+def _frame_radius(robot: Robot) -> float:
+    """Distance from the start to the farthest exit point, in m."""
+    return max(math.dist(cable.anchor, robot.platform.start) for cable in robot.cables)
 
 
 def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
