@@ -87,6 +87,7 @@ def test_every_case_has_a_stored_size() -> None:
                 assert 0.5 < size.nats / NATS[part.size] < 2.0, case.key
 
 
+@pytest.mark.validate
 def test_a_stored_size_shows_as_much_as_it_says() -> None:
     case = BY_KEY["quick-damping"]
     size = stored()[case.key]["damping"]
@@ -308,6 +309,7 @@ def test_only_parts_whose_every_case_has_an_answer_go_to_the_page() -> None:
     assert finished_sections(tuple(map(none, main_cases()[1:]))) == {}
 
 
+@pytest.mark.validate
 def test_the_robots_move_within_their_ropes() -> None:
     for name in NAMES:
         stage = Stage(Case("made", "empty", name, ()))

@@ -135,6 +135,7 @@ def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tm
     assert np.allclose(result.tension, built.tension, rtol=1e-9, atol=0.0)
 
 
+@pytest.mark.validate
 def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
     plan = read(
         tmp_path,
@@ -234,6 +235,7 @@ def test_a_machine_that_fails_is_no_row(tmp_path: Path) -> None:
         run_job(build_context(plan, {}), Job(0, 0, 0, VALUES), tmp_path / "file" / "folder")
 
 
+@pytest.mark.validate
 def test_recorded_winch_speeds_are_a_path_and_limits_of_tension_are_held_against_the_robot_file(tmp_path: Path) -> None:
     lines = (EXAMPLES / "eight" / "fit.csv").read_text(encoding="utf-8").splitlines()
     (tmp_path / "speeds.csv").write_text("\n".join(lines[:80]), encoding="utf-8")

@@ -89,6 +89,7 @@ def test_options_that_do_not_go_together_are_refused(
     assert all(word in said for word in words), said
 
 
+@pytest.mark.validate
 def test_a_platform_that_turns_follows_a_path_with_an_orientation(tmp_path: Path) -> None:
     robot, x, y, z = tmp_path / "crane.toml", *crane_robot().platform.start
     write_robot(crane_robot(), robot)

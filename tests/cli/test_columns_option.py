@@ -24,6 +24,7 @@ def laboratory_file(folder: Path) -> str:
     return str(folder / "log.csv")
 
 
+@pytest.mark.validate(but=["True"])
 @pytest.mark.parametrize("is_own_file", [True, False])
 def test_check_and_simulate_read_columns(is_own_file: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, robot = laboratory_file(tmp_path), tmp_path / "robot.toml"

@@ -48,6 +48,7 @@ def test_simulate_writes_the_orientation_and_tells_that_of_the_start(
     assert "trace" not in printed.out + printed.err
 
 
+@pytest.mark.validate
 def test_pages_draw_each_cable_to_its_attachment(tmp_path: Path) -> None:
     robot, speeds, page, modes = (tmp_path / name for name in ("robot.toml", "speeds.csv", "run.html", "modes.html"))
     write_robot(crane_robot(), robot)

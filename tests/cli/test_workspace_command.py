@@ -59,6 +59,7 @@ def test_the_orientations_at_a_position_of_a_rigid_platform(tmp_path: Path, caps
     assert "<svg" in figure.read_text(encoding="utf-8")
 
 
+@pytest.mark.validate
 def test_a_range_of_rotations_makes_the_workspace_smaller(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     robot, counts = written_crane(tmp_path), []
     arguments = ["workspace", robot, "--json", "--spacing", "3", "--acceleration", "1", "--angular-acceleration", "1"]

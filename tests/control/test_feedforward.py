@@ -90,6 +90,7 @@ def test_stretch_is_cancelled_in_the_co_simulation(name: str, tmp_path: Path) ->
     assert elastic.tension == pytest.approx(path_tensions(robot, path, elastic.time), abs=0.02 * rigid.tension.max())
 
 
+@pytest.mark.validate
 def test_effects_of_the_robot_file_are_cancelled_too(tmp_path: Path) -> None:
     effects = (
         EffectSetting("payload", {"mass": 40.0}),

@@ -73,6 +73,7 @@ def test_a_tolerance_holds_with_limits_on_the_way(
     assert motion.statistics.steps < 300
 
 
+@pytest.mark.validate
 def test_without_limits_as_well(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
     motion = cosimulate(build_fmus(with_winch(robot, FREE), tmp_path), CORNERS, SPEEDS)

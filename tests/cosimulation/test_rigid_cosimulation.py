@@ -130,6 +130,7 @@ def test_the_frame_has_orientation_and_angular_velocity(crane_fmus: RobotFmus) -
     assert np.array_equal(frame["strain_8"], result.strain[:, 7])
 
 
+@pytest.mark.validate
 def test_a_users_platform_turns_in_the_slot(crane_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = crane_robot()
     speeds = ramp_speeds(robot)[:2]

@@ -31,6 +31,7 @@ def likelihood_of(robot: Robot, recording: Recording) -> Likelihood:
     return Likelihood(robot, (), estimate_noise(robot, recording), interval)
 
 
+@pytest.mark.validate
 def test_innovations_are_those_of_a_plain_filter_on_other_equations() -> None:
     recording = rigid_recording(OCTAHEDRAL, 12)
     likelihood = likelihood_of(OCTAHEDRAL, recording)

@@ -70,6 +70,7 @@ def end_errors(own: tuple[UserFmu, ...], exact: np.ndarray, folder: Path) -> lis
     ]
 
 
+@pytest.mark.validate
 def test_a_plain_platform_without_rates_and_states_is_of_second_order(platform: Path, tmp_path: Path) -> None:
     exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     coarse, fine = end_errors((UserFmu("platform", platform),), exact.position[-1], tmp_path)
@@ -99,6 +100,7 @@ def test_missing_optional_features_are_noted(platform: Path, tmp_path: Path) -> 
     assert motion.statistics.iterations == 0
 
 
+@pytest.mark.validate
 def test_a_minimal_cable_gets_the_start_position_and_its_missing_columns_are_omitted(tmp_path: Path) -> None:
     robot, own = paper_robot(), (UserFmu("cable_2", spring_cable(tmp_path)),)
     linear = [replace(cable, law="linear") if place == 1 else cable for place, cable in enumerate(robot.cables)]

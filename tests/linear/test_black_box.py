@@ -251,6 +251,7 @@ def test_dead_time_is_refused(tmp_path: Path) -> None:
         linearise_robot_fmus(build_fmus(robot, tmp_path))
 
 
+@pytest.mark.validate
 def test_drift_is_noted(tmp_path: Path) -> None:
     setting = EffectSetting("thermal", {"rise": 10.0, "time": 20.0, "expansion": 1.2e-5}, (1, 2, 3))
     robot = paper_robot(damping=4e8).with_effect(setting)

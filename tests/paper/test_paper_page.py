@@ -56,6 +56,7 @@ def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) ->
     assert all((tmp_path / file).is_file() for file in files if file.endswith(".csv"))
 
 
+@pytest.mark.validate
 def test_names_inside_the_figures_are_used_once(tmp_path) -> None:  # type: ignore[no-untyped-def]
     ids = re.findall(r'\bid="([^"]+)"', _page(tmp_path))
     assert len(ids) == len(set(ids))

@@ -99,6 +99,7 @@ def test_examples_of_the_fmus_page_run(tmp_path: Path, monkeypatch: pytest.Monke
     assert results["result"]["platform.position.z"][-1] == pytest.approx(example("three").platform.start[2], abs=1e-6)
 
 
+@pytest.mark.validate
 def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
     for source in ("system/tautwire", "fmu_src/tautwire_fmu"):
         shutil.copytree(ROOT / source, tmp_path / source, ignore=shutil.ignore_patterns("__pycache__"))

@@ -170,6 +170,7 @@ def test_what_the_coordinates_do_not_fit_stays_as_its_name_has_it(robot: Robot, 
     assert proposed({"enc_1": one} | axes(recorded), None)["rope_length_1"].factor is None
 
 
+@pytest.mark.validate
 def test_a_tracker_that_wrote_zeros_for_a_lost_platform_tells_the_factor_of_counts_too() -> None:
     turning = octahedral_robot()
     frame = rigid_recording(with_noise(turning), 800).frame()

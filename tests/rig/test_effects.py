@@ -112,6 +112,7 @@ def test_every_effect_of_the_rig_is_tried_here() -> None:
     assert {name for name, _, _ in CASES} | {"unlisted_pushing"} == of_points
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize(("name", "strong", "neutral"), CASES, ids=[case[0] for case in CASES])
 def test_neutral_parameters_change_nothing_and_strong_ones_do(
     name: str, strong: dict[str, Any], neutral: dict[str, Any], plain: np.ndarray

@@ -78,6 +78,7 @@ def test_fixed_steps_give_what_the_accurate_integration_gives() -> None:
     assert cells[[0, middle, -1]] == pytest.approx(exact.cell, abs=0.02)
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("cables", [2, 3, 4])
 def test_a_planar_robot_moves_and_is_shaken_in_its_plane_alone(cables: int) -> None:
     made = design(chance(cables), cables, True)

@@ -129,6 +129,7 @@ def test_a_body_whose_ropes_hold_its_centre_of_mass_is_a_point(effects: dict[str
     assert frequencies_of(replace(point, body=body))[3:] == pytest.approx(natural_frequencies(point), rel=1e-6)
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("make", ROBOTS.values(), ids=ROBOTS)
 @pytest.mark.parametrize(("name", "strong", "neutral"), CASES, ids=[f"{case[0]}-{len(case[1])}" for case in CASES])
 def test_effects_of_bodies_show_and_vanish_and_rest_at_the_start(

@@ -61,13 +61,15 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     Empty where they say nothing. For a robot that declares effects which are no part of the kinematics only travel
     beyond its size counts, and its tensions do not for one with effects that are no part of the balance of forces.
     """
-    travel, declared = travel_error(robot, recording), {setting.name for setting in robot.effects}
+    declared = {setting.name for setting in robot.effects}
     if declared & EFFECTS_ON_POSES:
-        return (travel,) if travel else ()
+        error = travel_error(robot, recording)
+        return (error,) if error else ()
     motion = check_motion(robot, recording)
+    travel = None if _follows(motion) else _excessive_travel(robot, recording)
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
-    is_odd = motion is not None and motion.misfit > MAX_MISFIT
+    is_odd = motion is not None and not _follows(motion)
     if is_odd and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
         return (error,)
     if motion is not None and motion.readings:
@@ -90,12 +92,19 @@ def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
 
     None too where positions confirm it: a platform may hang far below where it starts.
     """
+    error = _excessive_travel(robot, recording)
+    return None if error is None or _follows(check_motion(robot, recording)) else error
+
+
+def _follows(motion: MotionCheck | None) -> bool:
+    return motion is not None and motion.misfit <= MAX_MISFIT
+
+
+def _excessive_travel(robot: Robot, recording: Recording) -> RecordingError | None:
+    """The error of :func:`travel_error`, whatever the positions say."""
     travel, size = np.max(np.abs(recording.wound_lengths()), axis=0), robot_size(robot)
     cable = int(np.argmax(travel)) + 1
     if travel[cable - 1] <= MAX_TRAVEL_TO_SIZE * size:
-        return None
-    motion = check_motion(robot, recording)
-    if motion is not None and motion.misfit <= MAX_MISFIT:
         return None
     problem = f"winch {cable} moves {travel[cable - 1]:,.4g} m of rope, and the robot is no larger than {size:.3g} m"
     hint = "check that time is in s and winch speeds are in m/s; [recording.columns] declares other units and factors"

@@ -252,7 +252,7 @@ def changed_by_what_is_uncertain(name: str) -> list[tuple[Robot, Recording]]:
     return [(robot, with_tensions(gain=1.01, cable=0))]
 
 
-@pytest.mark.validate(but=["anchor", "modulus"])
+@pytest.mark.validate(but=["modulus"])
 @pytest.mark.parametrize(
     ("name", "uncertainty"),
     [
@@ -282,7 +282,7 @@ def test_an_uncertain_damping_is_expected_also_where_none_is_declared() -> None:
     assert uncertain**2 - exact**2 == pytest.approx(increase, rel=0.05)
 
 
-@pytest.mark.validate(but=["tension_offset"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("name", "uncertainty", "quantity"),
     [
@@ -367,6 +367,7 @@ def test_a_payload_within_what_load_cells_may_be_off_by_is_no_fault_of_the_platf
         assert residual_of(components, "platform", "force z").mean == pytest.approx(-weight, rel=0.02)
 
 
+@pytest.mark.validate
 def test_errors_of_sensors_with_a_memory_are_expected_no_larger_than_their_noise() -> None:
     robot, recording = example("three"), recorded("three", 3)
     white = estimate_noise(robot, recording)
