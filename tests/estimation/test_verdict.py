@@ -81,7 +81,8 @@ def test_what_a_disturbance_of_usual_size_takes_up_lacks_nothing_however_well_it
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
     word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
     assert word == "effects"
-    assert "drum (27 % of what is missed); 12 % remains, in all no more than 8 times what noise leaves." in sentence
+    remains = "12 % remains, in all no more than 8 standard deviations of one sample's noise."
+    assert f"drum (27 % of what is missed); {remains}" in sentence
     assert sentence.endswith("The error is then 40 N in tension_2, where noise leaves 2 N; it is strongest at 1.2 Hz.")
 
 

@@ -97,13 +97,15 @@ def self_stress_deviation(
     is_tension_unmeasured = not any(recording.has_tension for recording in recordings)
     if declared is None and not is_tension_unmeasured:
         return 0.0, ()
-    deviation = policy.self_stress_ratio * float(np.mean(static_tensions(robot))) if declared is None else declared
+    tensions = static_tensions(robot)
+    deviation = policy.self_stress_ratio * float(np.mean(tensions)) if declared is None else declared
     if deviation == 0.0:
         return 0.0, ()
     reason = "tension.preferred_uncertainty" if declared is not None else "no tension is measured"
+    by_rule = f"{tensions.min():.3g} to {tensions.max():.3g} N"
     return deviation, (
-        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they are estimated "
-        "beside every effect, so that a wrong pretension is not taken for one",
+        f"{reason}: start tensions may differ from the tension rule's, {by_rule}, by {deviation:.3g} N; they are "
+        "estimated beside every effect, so that a wrong pretension is not taken for one",
     )
 
 

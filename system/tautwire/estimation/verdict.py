@@ -83,7 +83,7 @@ def verdict_beside_disturbance(
     if large and (is_disturbance or is_explained):
         share_of = {labels[index]: shares.effects[index] for index in large}
         named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
-        noise = f"{policy.max_size_of_disturbance:g} times what noise leaves"
+        noise = f"{policy.max_size_of_disturbance:g} standard deviations of one sample's noise"
         kind = f", in all no more than {noise}" if is_disturbance else ""
         others = shares.explained - max(shares.effects)
         is_stated = len(names) == 1 and others >= policy.min_share and uncertain_parameters(context.robot)

@@ -79,6 +79,7 @@ def trace_page(trace: Trace, links: Mapping[str, str], provenance: Provenance | 
         figures,
         trace=trace,
         noise_sentence=noise_sentence(trace),
+        has_declared=any(each.declared is not None for effect in trace.effects for each in effect.parameters.values()),
         has_check=comparison_by_role(trace, "check") is not None,
         correlations=_correlation_sentences(trace),
         alternatives=alternative_texts(trace),
@@ -216,7 +217,7 @@ def _component_rows(trace: Trace) -> list[Row]:
 
 def _residual_pattern(part: ComponentResidual) -> str:
     """What a component's residual does: the signal that it follows, or the frequency at which it rings."""
-    if part.resonance_frequency is not None and part.is_significant:
+    if part.oscillates:
         return f"oscillates at {part.resonance_frequency:.2f} Hz"
     association = part.correlated_signal
     return f"{association.name} ({100.0 * association.correlation:.0f} %)" if association else ABSENT_TEXT

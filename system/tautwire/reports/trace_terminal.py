@@ -35,6 +35,7 @@ from .trace_texts import (
 
 MAX_CANDIDATES_SHOWN = 5
 CANDIDATES_CAPTION = """\
+values and evidence are those of each round; above are those of all effects together
 NIV: normalised innovation variance on unseen data, 1 for white noise
 needs: evidence that one more effect needs there, if it acts where the first one does
 less simple: more parameters than the one taken, or offsets in place of one load"""

@@ -38,7 +38,8 @@ maximum = 5000.0                  # N
 preferred = {preferred}                 # N
 # preferred_uncertainty = 50.0    # N, how far true start tensions may be from that
 
-# Standard deviation of the noise of one sample; remove what you do not know.
+# Standard deviation of the noise of one sample; remove what you do not know. An uncertainty is a standard deviation
+# too: about half of a data sheet's +- that is a limit.
 [sensors]
 position_noise = 2e-4             # m
 tension_noise = 1.0               # N
@@ -57,7 +58,7 @@ anchor = [{x}, {y}, {z}]  # m, where the cable leaves the frame
 # swivel_axis = [0.0, 0.0, 1.0]   # along which the rope arrives at its exit pulley; vertical when absent
 modulus = 1.0e11                  # Pa, E: steel rope about 1e11, braided polyethylene about 6e10
 area = 3.0e-6                     # m^2, S, the section that the modulus refers to
-damping = 1.0e9                   # Pa s, c; 0 when absent
+damping = 1.0e9                   # Pa s, c: modulus times the time of retardation; 0 when absent
 law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
 # modulus_uncertainty = 2e9       # Pa
 # damping_uncertainty = 1e8       # Pa s

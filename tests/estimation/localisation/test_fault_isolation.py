@@ -1,5 +1,7 @@
 """Which component is in question: each row of the table, and the words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,15 @@ def test_the_sentence_has_the_figures() -> None:
         "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance closes as expected. "
         "In question: cable 2 (rope or winch).",
     )
+
+
+def test_a_constant_force_is_told_as_such_and_not_as_what_swings() -> None:
+    constant = replace(part("platform", "force z", 9.33, rings_at=1.31), mean=-9.331)
+    _, sentence = isolation_verdict([part("cable 1", "tension", 1.3)], [constant])
+    assert "force z deviates by 9.3 N rms, -9.3 N in the mean (expected 1.3 N)" in sentence
+    assert "oscillates" not in sentence
+    swinging = replace(constant, rms=12.0)
+    assert "it oscillates at 1.31 Hz" in isolation_verdict([part("cable 1", "tension", 1.3)], [swinging])[1]
 
 
 def test_the_sentence_tells_what_rings_at_the_platform_alone() -> None:

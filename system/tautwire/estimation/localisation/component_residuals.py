@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -99,6 +100,7 @@ def _autocorrelation(values: Array) -> Array:
 
 
 PLATFORM = "platform"
+MIN_CONSTANT_SHARE = 0.95
 
 
 @dataclass(frozen=True)
@@ -136,6 +138,17 @@ class ComponentResidual:
     def is_significant(self) -> bool:
         """Whether the residual is more than noise and stated uncertainties."""
         return self.ratio > self.threshold
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether its mean is nearly all of it; that of a tension was subtracted."""
+        return self.component == PLATFORM and abs(self.mean) > MIN_CONSTANT_SHARE * self.rms
+
+    @property
+    def oscillates(self) -> bool:
+        """Whether it rings, and varies about its mean by more than noise and stated uncertainties."""
+        variation = math.sqrt(max(self.rms**2 - self.mean**2, 0.0))
+        return self.resonance_frequency is not None and variation > self.threshold * self.expected_rms
 
 
 def root_mean_square(values: Array) -> float:

@@ -78,7 +78,7 @@ def isolation_verdict(
         hidden_candidates,
     )
     facts = [*_cable_facts(cables), *_platform_facts(platform)]
-    oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]
+    oscillating = [part for part in platform if part.oscillates]
     if oscillating and not any(deviating_by_cable.values()):
         frequency = max(oscillating, key=lambda part: part.ratio).resonance_frequency
         facts.append(f"it oscillates at {frequency:.2f} Hz, as a swinging load or a shaker does")
@@ -147,12 +147,13 @@ def _platform_facts(platform: Sequence[ComponentResidual]) -> list[str]:
 
 
 def _deviation_text(part: ComponentResidual) -> str:
-    return f"by {_two_digits(part.rms)} {part.unit} rms (expected {_two_digits(part.expected_rms)} {part.unit})"
+    mean = f", {_two_digits(part.mean)} {part.unit} in the mean" if part.is_constant else ""
+    return f"by {_two_digits(part.rms)} {part.unit} rms{mean} (expected {_two_digits(part.expected_rms)} {part.unit})"
 
 
 def _two_digits(value: float) -> str:
     """Two significant digits, without an exponent."""
-    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+    return f"{value:.0f}" if abs(value) >= 10.0 else f"{value:.2g}"
 
 
 def _without_balance(deviating_by_cable: Mapping[int, bool], deviating_cables: Sequence[int]) -> str:
