@@ -10,9 +10,11 @@ import pytest
 from scipy.io import savemat
 
 from tautwire.errors import InputError, RecordingError
+from tautwire.recordings.column_map import column_map
 from tautwire.recordings.recording import Recording, read_recording, recording_errors
 from tautwire.robot.robot_file_reader import read_columns_file, robot_from_text
 from tautwire.robot.robot_file_writer import write_robot
+from tautwire.robot.schema import RecordedColumn
 from tests.support.refusals import refused
 from tests.support.robots import EXAMPLES
 
@@ -245,3 +247,13 @@ def test_an_unknown_unit_in_a_declared_name_is_not_taken_for_si(tmp_path: Path, 
         return
     with pytest.raises(RecordingError, match=r"'\[deg\]', not a known unit of length; write unit or factor into"):
         read_recording(tmp_path / "log.csv", 3, table)
+
+
+def test_alike_columns_are_told_together() -> None:
+    cells = [RecordedColumn(f"tension_{cable}", f"F{cable}", unit="kN") for cable in (1, 2, 3)]
+    axes = [RecordedColumn(axis, axis.upper()) for axis in ("x", "y")]
+    declared = [RecordedColumn("time", "t"), *cells, *axes, RecordedColumn("z", "Z", sign=-1.0)]
+    assert column_map(declared, 3).in_words() == (
+        "columns by the map: time is 't', tension_1 to tension_3 are 'F1' to 'F3' in kN, x to y are 'X' to 'Y', "
+        "z is 'Z' with its sign changed"
+    )

@@ -107,9 +107,11 @@ def test_the_factor_of_named_counts_is_proposed_with_its_figure(
     source = "the tracker's coordinates" if apart else "the coordinates"
     pattern = (
         rf"factor and sign by {source}, to [0-9.]+ % \(rms; cables alike to [0-9.]+ %\): an estimate with the errors "
-        r"of drum and rope in it, replace it by metres per count \(2 pi \* drum radius / counts per turn\)"
+        r"of drum and rope in it, "
     )
-    assert re.fullmatch(pattern, columns["rope_length_2"].doubt)
+    formula = r"replace it by metres per count \(2 pi \* drum radius / counts per turn\)"
+    assert re.fullmatch(pattern + formula, columns["rope_length_1"].doubt)
+    assert re.fullmatch(f"{pattern}as above", columns["rope_length_2"].doubt)
     assert re.match(
         r'rope_length_2 = { name = "enc_2_cnt", factor = [0-9.e-]+, sign = -1 }  #', columns["rope_length_2"].line()
     )

@@ -50,6 +50,8 @@ Array = NDArray[np.float64]
 
 # Standard deviations by which a constant has to differ from its declared value to be reported.
 MIN_REPORTED_SIGMAS = 2.0
+# In declared standard deviations: constants that moved by less are counted, not listed.
+MIN_LISTED_SIGMAS = 1.0
 
 
 @dataclass(frozen=True)
@@ -112,10 +114,13 @@ class Calibration:
 
     def notes(self, robot: Robot, path: str) -> tuple[str, ...]:
         """A note of the constants that differ significantly from their declared values, the farthest first."""
-        significant = []
+        significant, others = [], 0
         constants = zip(self.parameters, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True)
         for parameter, estimate, deviation in sorted(constants, key=lambda constant: -abs(constant[1])):
             if abs(estimate) < MIN_REPORTED_SIGMAS * deviation:
+                continue
+            if abs(estimate) < MIN_LISTED_SIGMAS:
+                others += 1
                 continue
             value, half_width = (
                 parameter.declared(robot) + parameter.standard_deviation * estimate,
@@ -123,6 +128,7 @@ class Calibration:
             )
             quantity = f"{parameter.label} {value:.4g} {parameter.unit}".rstrip()
             significant.append(f"{quantity}, +- {half_width:.2g} ({estimate:+.1f} declared standard deviations)")
+        significant += [f"{others} by less than {MIN_LISTED_SIGMAS:g} of them"] if others else []
         if not significant:
             return ()
         return (f"{path}: estimated within the robot file's uncertainties: {'; '.join(significant)}",)

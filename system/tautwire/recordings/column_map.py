@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 from ..errors import AbsentColumnsError, RecordingError, RobotFileError, format_value
 from ..name_suggestions import suggest_name
 from ..robot.recorded_columns import columns_of_cables, recorded_name
-from ..robot.schema import RecordedColumn
+from ..robot.schema import AXES, RecordedColumn
 from .csv_lines import unit_in_name
 from .recording_table import known_columns
 from .units import UNITS, Unit, find_unit, quantity_of, require_unit
@@ -116,7 +117,8 @@ class ColumnMap:
 
     def in_words(self) -> str:
         """What is declared, in one line; blank where nothing is."""
-        parts = [f"{column.column} is {format_value(column.name)}{_scale_in_words(column)}" for column in self.declared]
+        groups = groupby(self.declared, key=lambda column: (_kind(column.column), _scale_in_words(column)))
+        parts = [_columns_in_words(list(columns), scale) for (_, scale), columns in groups]
         return f"columns by {self.declared[0].file or 'the map'}: {', '.join(parts)}" if parts else ""
 
 
@@ -143,6 +145,19 @@ def place_of(column: RecordedColumn, key: str = "") -> str:
     """The file and key where a column is declared."""
     path = f"{column.table}.{column.column}" + (f".{key}" if key else "")
     return f"{column.file}: {path}" if column.file else path
+
+
+def _kind(column: str) -> str:
+    return "axis" if column in AXES else column.rpartition("_")[0] or column
+
+
+def _columns_in_words(columns: Sequence[RecordedColumn], scale: str) -> str:
+    """Columns of one kind and scale, as in "tension_1 to tension_4 are 'F1' to 'F4' in kN"."""
+    first, last = columns[0], columns[-1]
+    if len(columns) == 1:
+        return f"{first.column} is {format_value(first.name)}{scale}"
+    names = f"{format_value(first.name)} to {format_value(last.name)}"
+    return f"{first.column} to {last.column} are {names}{scale}"
 
 
 def _scale_in_words(column: RecordedColumn) -> str:

@@ -217,8 +217,10 @@ def _scaled(
             scaled.append(replace(changed, unit=unit, doubt=doubt.replace(NO_UNIT, f"{unit} by {source}")))
         else:
             formula = column.doubt.partition(ADD_FACTOR)[2].partition("; ")[0] or "the data sheet's"
-            estimate = f"{ESTIMATED_FACTOR}, replace it by {formula}"
-            told = f"factor and sign by {source}, {rms}{alike}): {estimate}"
+            remedy = (
+                "as above" if any(ESTIMATED_FACTOR in each.doubt for each in scaled) else f"replace it by {formula}"
+            )
+            told = f"factor and sign by {source}, {rms}{alike}): {ESTIMATED_FACTOR}, {remedy}"
             rest = column.doubt.replace(f"{ADD_FACTOR}{formula}", told).replace(NO_UNIT, told).replace(f"; {asked}", "")
             scaled.append(replace(changed, factor=float(f"{factor:.4g}"), doubt=rest))
     return scaled
