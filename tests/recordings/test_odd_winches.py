@@ -84,6 +84,17 @@ def test_a_fault_of_a_winch_is_told_with_its_cause(fault: str) -> None:
     assert any(f"winch travel of cable {CABLE} does not match" in error.problem for error in errors)
 
 
+@pytest.mark.parametrize(
+    ("change", "cause"),
+    [(one_in_mm, "rope_length_2 is in mm"), (stuck, "the rate of rope_length_2 stays at 0 from 12")],
+)
+def test_a_fault_of_a_recorded_length_is_told_by_its_column(change: Change, cause: str) -> None:
+    recording = with_speeds(change)
+    lengths = replace(recording, rope_length=-recording.wound_lengths())
+    (odd,) = odd_winches(example("three"), lengths)
+    assert odd.cable == CABLE and cause in odd.cause and "rope_length_2" in odd.remedy
+
+
 def moved_anchor(robot: Robot, by: tuple[float, float, float]) -> Robot:
     cables = list(robot.cables)
     anchor = tuple(np.add(cables[CABLE - 1].anchor, by).tolist())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..robot.schema import Robot
-from .alternative_readings import SPEED_UNITS, Mistake, convert, mistakes_text
+from .alternative_readings import LENGTH_UNITS, SPEED_UNITS, Mistake, convert, mistakes_text
 from .column_corrections import scaled
 from .geometry_reading import GeometryReading, recorded_poses
 from .motion_regression import centred, moving_rows
@@ -67,6 +67,18 @@ class _Travel:
         squares = np.mean(self.lengths**2, axis=0)
         return np.asarray(np.sqrt(np.maximum(squares, LEAST_MOTION**2 * squares.mean())))
 
+    def is_length(self, cable: int) -> bool:
+        """Whether a cable's rope length was recorded, of which its speed is the rate."""
+        return cable + 1 in self.recording.rope_lengths
+
+    def column(self, cable: int) -> str:
+        """The recorded column of a cable's winch."""
+        return f"rope_length_{cable + 1}" if self.is_length(cable) else f"winch_speed_{cable + 1}"
+
+    def speed_name(self, cable: int) -> str:
+        """What to call a cable's speed."""
+        return f"the rate of {self.column(cable)}" if self.is_length(cable) else self.column(cable)
+
     def misfit(self, cable: int, *others: Array) -> float:
         """Rms of a cable's length beside constant, a drum's scale and other columns (M,), over that of its motion."""
         wound, length = self.wound[:, cable], self.lengths[:, cable]
@@ -113,11 +125,11 @@ def _fault(travel: _Travel, cable: int) -> Texts | None:
 
 
 def _other_unit(travel: _Travel, cable: int) -> Texts | None:
-    """A unit of speed in which a rope's length follows its winch."""
-    length, wound, name = travel.lengths[:, cable], travel.wound[:, cable], f"winch_speed_{cable + 1}"
-    for unit, size in SPEED_UNITS.items():
+    """A unit in which a rope's length follows its winch."""
+    length, wound, name = travel.lengths[:, cable], travel.wound[:, cable], travel.column(cable)
+    for unit, size in (LENGTH_UNITS if travel.is_length(cable) else SPEED_UNITS).items():
         left = float(np.sqrt(np.mean((length + size * wound) ** 2))) / travel.motion[cable]
-        if unit != "m/s" and _is_explained(left, travel.misfit(cable)):
+        if size != 1.0 and _is_explained(left, travel.misfit(cable)):
             mistake = Mistake(f"{name} is in {unit}", convert(name, size), scaled((name,), size, unit))
             return mistakes_text([[mistake]], travel.recording)
     return None
@@ -125,17 +137,17 @@ def _other_unit(travel: _Travel, cable: int) -> Texts | None:
 
 def _copied(travel: _Travel, cable: int) -> Texts | None:
     """One speed in two columns whose ropes move differently."""
-    speeds, name = travel.recording.winch_speed, f"winch_speed_{cable + 1}"
+    speeds, name = travel.recording.winch_speed, travel.column(cable)
     for other in range(speeds.shape[1]):
         differ = np.sqrt(np.mean((travel.lengths[:, cable] - travel.lengths[:, other]) ** 2))
         if differ > MAX_MISFIT * travel.motion[cable] and np.array_equal(speeds[:, cable], speeds[:, other]):
-            return f"{name} repeats winch_speed_{other + 1}", f"record {name}"
+            return f"{name} repeats {travel.column(other)}", f"record {name}"
     return None
 
 
 def _held(travel: _Travel, cable: int) -> Texts | None:
     """One speed for long while a taut rope's length changes otherwise."""
-    speed, name = travel.recording.winch_speed[:, cable], f"winch_speed_{cable + 1}"
+    speed, name = travel.recording.winch_speed[:, cable], travel.column(cable)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.diff(speed) == 0.0).astype(int), [0]])))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
     for first, last in stretches:
@@ -148,7 +160,7 @@ def _held(travel: _Travel, cable: int) -> Texts | None:
         shorter = missed[0] - missed.min() if _is_taut(travel.recording.tension[first:last, cable]) else 0.0
         if max(missed.max() - missed[0], shorter) > travel.motion[cable]:
             begin, end = (f"{travel.recording.time[row]:.5g}" for row in (first, last))
-            cause = f"{name} stays at {speed[first]:.4g} from {begin} to {end} s"
+            cause = f"{travel.speed_name(cable)} stays at {speed[first]:.4g} from {begin} to {end} s"
             return cause, f"record {name}, or cut that part out"
     return None
 
@@ -160,35 +172,36 @@ def _is_taut(tension: Array) -> bool:
 
 def _clipped(travel: _Travel, cable: int) -> Texts | None:
     """A largest or smallest speed in many samples, in which the rope's length changes faster."""
-    speed, name = travel.recording.winch_speed[:, cable], f"winch_speed_{cable + 1}"
+    speed, name = travel.recording.winch_speed[:, cable], travel.column(cable)
     rate = -np.gradient(travel.lengths[:, cable], travel.recording.time[travel.rows])
     for limit in (float(speed.max()), float(speed.min())):
         is_clipped = speed == limit
         seen = rate[is_clipped[travel.rows]]
         is_frequent = bool(np.mean(is_clipped) > MIN_CLIPPED_SHARE and seen.size and limit)
         if is_frequent and np.median(seen) / limit > MIN_CLIPPED_RATIO:
-            cause = f"{name} is clipped at {limit:.4g} in {np.count_nonzero(is_clipped)} samples"
+            cause = f"{travel.speed_name(cable)} is clipped at {limit:.4g} in {np.count_nonzero(is_clipped)} samples"
             return cause, f"record {name} in its whole range"
     return None
 
 
 def _wrapped(travel: _Travel, cable: int) -> Texts | None:
     """A few speeds far beyond all others, as differences of counts that begin anew have them."""
-    speed, name = np.abs(travel.recording.winch_speed[:, cable]), f"winch_speed_{cable + 1}"
+    speed, name = np.abs(travel.recording.winch_speed[:, cable]), travel.speed_name(cable)
     usual = float(np.quantile(speed, SPEED_QUANTILE))
     if not speed.max() > MIN_SPIKE_RATIO * usual > 0.0:
         return None
     cause = f"{name} reaches {speed.max():.3g} m/s, and stays below {usual:.3g} in 99 % of all samples"
-    return f"{cause}, as where counts wrap", f"leave these samples empty, or record rope_length_{cable + 1}"
+    instead = "" if travel.is_length(cable) else f", or record rope_length_{cable + 1}"
+    return f"{cause}, as where counts wrap", f"leave these samples empty{instead}"
 
 
 def _unsigned(travel: _Travel, cable: int) -> Texts | None:
     """No speed below zero though the rope becomes longer on its way."""
     speed, length = travel.recording.winch_speed[:, cable], travel.lengths[:, cable]
     paid_out = float(np.max(length - np.minimum.accumulate(length)))
-    if np.any(speed < 0.0) or paid_out < travel.motion[cable]:
+    if travel.is_length(cable) or np.any(speed < 0.0) or paid_out < travel.motion[cable]:
         return None
-    name = f"winch_speed_{cable + 1}"
+    name = travel.column(cable)
     return f"{name} is never negative", f"record {name} with its sign, negative where the rope pays out"
 
 
