@@ -93,6 +93,8 @@ def test_a_note_says_by_how_many_standard_deviations_a_number_moved() -> None:
     assert "gain of tension 2 0.98, +- 0.002 (-2.0 declared standard deviations)" in note
     assert "offset of tension 1 -4 N, +- 0.39 (-2.0 declared standard deviations)" in note
     assert calibration(0.1).notes(example("three"), "fit.csv") == ()
+    (note,) = calibration(0.5).notes(example("three"), "fit.csv")
+    assert note.endswith("uncertainties: 15 by less than 1 declared standard deviation")
 
 
 def test_the_number_that_moved_farthest_comes_first() -> None:

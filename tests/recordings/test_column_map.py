@@ -252,8 +252,8 @@ def test_an_unknown_unit_in_a_declared_name_is_not_taken_for_si(tmp_path: Path, 
 def test_alike_columns_are_told_together() -> None:
     cells = [RecordedColumn(f"tension_{cable}", f"F{cable}", unit="kN") for cable in (1, 2, 3)]
     axes = [RecordedColumn(axis, axis.upper()) for axis in ("x", "y")]
-    declared = [RecordedColumn("time", "t"), *cells, *axes, RecordedColumn("z", "Z", sign=-1.0)]
+    declared = [*cells, RecordedColumn("time", "t"), *axes, RecordedColumn("z", "Z", sign=-1.0)]
     assert column_map(declared, 3).in_words() == (
-        "columns by the map: time is 't', tension_1 to tension_3 are 'F1' to 'F3' in kN, x to y are 'X' to 'Y', "
+        "columns by the map: tension_1 to tension_3 are 'F1' to 'F3' in kN, time is 't', x to y are 'X' to 'Y', "
         "z is 'Z' with its sign changed"
     )

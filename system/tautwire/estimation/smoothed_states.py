@@ -128,7 +128,7 @@ class Calibration:
             )
             quantity = f"{parameter.label} {value:.4g} {parameter.unit}".rstrip()
             significant.append(f"{quantity}, +- {half_width:.2g} ({estimate:+.1f} declared standard deviations)")
-        significant += [f"{others} by less than {MIN_LISTED_SIGMAS:g} of them"] if others else []
+        significant += [f"{others} by less than {MIN_LISTED_SIGMAS:g} declared standard deviation"] if others else []
         if not significant:
             return ()
         return (f"{path}: estimated within the robot file's uncertainties: {'; '.join(significant)}",)
