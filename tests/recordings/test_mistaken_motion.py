@@ -254,6 +254,12 @@ def test_ropes_that_give_are_no_drums(gain: float) -> None:
     assert recording_mistakes(robot, winding_of(robot, along_z(robot, 0.5, 9.0, time), time, gain)) == ()
 
 
+def test_a_ratio_that_differs_by_cable_is_no_gear() -> None:
+    robot, recording = shipped("three")
+    assert recording_mistakes(robot, speeds([0.638, 0.65, 0.656])(recording)) == ()
+    assert recording_mistakes(robot, speeds([0.647, 0.65, 0.652])(recording)) != ()
+
+
 def test_an_effect_that_the_robot_file_declares_is_no_mistake() -> None:
     robot, recording = shipped("three")
     moved = another_origin(recording)
