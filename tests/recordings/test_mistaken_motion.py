@@ -254,9 +254,11 @@ def test_ropes_that_give_are_no_drums(gain: float) -> None:
     assert recording_mistakes(robot, winding_of(robot, along_z(robot, 0.5, 9.0, time), time, gain)) == ()
 
 
-def test_a_ratio_that_differs_by_cable_is_no_gear() -> None:
+def test_a_ratio_that_differs_by_cable_or_in_time_is_no_gear() -> None:
     robot, recording = shipped("three")
-    assert recording_mistakes(robot, speeds([0.638, 0.65, 0.656])(recording)) == ()
+    assert recording_mistakes(robot, speeds([0.6, 0.65, 0.7])(recording)) == ()
+    varying = 0.65 + 0.2 * np.sin(recording.time / 2.0)[:, None]
+    assert recording_mistakes(robot, replace(recording, winch_speed=varying * recording.winch_speed)) == ()
     assert recording_mistakes(robot, speeds([0.647, 0.65, 0.652])(recording)) != ()
 
 

@@ -22,8 +22,8 @@ MIN_UNIT_RATIO, MAX_UNIT_ERROR = 1.25, 0.01
 MAX_RATIO_SPREAD = 0.03
 # Ratios of geometric to wound lengths that drums and ropes that give may have, whatever the unit.
 GIVING_ROPES = (0.5, 4.0)
-# Beyond the ratio it is a gear's if it leaves this misfit at most.
-MIN_GEAR_RATIO, MAX_GEAR_MISFIT = 1.25, 0.01
+# Beyond the ratio it is a gear's if it leaves this share of what is missed at most, and cables differ by no more.
+MIN_GEAR_RATIO, MAX_GEAR_SHARE, MAX_GEAR_SPREAD = 1.25, 0.1, 0.1
 LONG_TIME_UNITS = ("min", "h", "d")
 SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 
@@ -84,9 +84,9 @@ def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[
             yield WindingReading(time_unit, speed_unit, signs, order)
         sizes = [TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit] for time_unit, speed_unit in units]
         is_unit = any(abs(ratio / size - 1.0) <= MAX_UNIT_ERROR for size in sizes)
-        is_of_ropes = GIVING_ROPES[0] < ratio < GIVING_ROPES[1]
-        is_of_ropes &= not _is_of_gear(lengths, np.array(signs) * wound[:, order], ratio)
-        if not is_unit and not is_of_ropes and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio:
+        is_of_gear = _is_of_gear(lengths, np.array(signs) * wound[:, order], ratio)
+        is_of_angle = not GIVING_ROPES[0] < ratio < GIVING_ROPES[1] and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio
+        if not is_unit and (is_of_angle or (is_of_gear and np.ptp(moving) <= MAX_GEAR_SPREAD * ratio)):
             for time_unit, size in TIME_UNITS.items():
                 if SAMPLE_INTERVALS[0] <= interval * size <= SAMPLE_INTERVALS[1]:
                     yield WindingReading(time_unit, None, signs, order, ratio / size)
@@ -96,8 +96,8 @@ def _is_of_gear(lengths: Array, wound: Array, ratio: float) -> bool:
     """Whether a ratio of centred lengths to travel, each (N, n), is that of a gear, and not what ropes give."""
     if 1.0 / MIN_GEAR_RATIO < ratio < MIN_GEAR_RATIO:
         return False
-    missed = np.linalg.norm(lengths + ratio * wound)
-    return bool(missed <= MAX_GEAR_MISFIT * np.linalg.norm(lengths)) and moves_along_two_axes(lengths)
+    missed, without = np.linalg.norm(lengths + ratio * wound), np.linalg.norm(lengths + wound)
+    return bool(missed <= MAX_GEAR_SHARE * without) and moves_along_two_axes(lengths)
 
 
 def are_of_one_system(geometry: GeometryReading, winding: WindingReading) -> bool:

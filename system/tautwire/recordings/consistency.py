@@ -11,8 +11,9 @@ from ..errors import RecordingError
 from ..robot.schema import Robot
 from .alternative_readings import WindingReading, mistakes_text
 from .geometry_reading import GeometryReading, recorded_poses
-from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
+from .mistaken_motion import MAX_MISFIT, MIN_IMPROVEMENT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
+from .mistaken_points import PointMistake, point_mistake
 from .mistaken_tensions import TensionCheck, check_tensions
 from .motion_regression import centred, length_regression
 from .odd_winches import OddWinch, odd_winches
@@ -28,6 +29,8 @@ MAX_TRAVEL_TO_SIZE = 3.0
 MAX_WINCH_SPEED, SPEED_QUANTILE = 60.0, 0.99
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
+# Of lifelike recordings the ropes' motion and the winch travel differ by less.
+MAX_USUAL_MISFIT = 0.15
 CHECKED_DURATION = 60.0  # s
 MAX_SAMPLE_INTERVAL = 0.5  # s
 # Rms of what lengths in the columns of speeds miss, over that of the geometric ones.
@@ -72,9 +75,12 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     is_odd = motion is not None and not _follows(motion)
     if is_odd and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
         return (error,)
-    if motion is not None and motion.readings:
+    points = point_mistake(robot, recording) if is_odd else None
+    if motion is not None and motion.readings and not _is_better(points, motion):
         errors.append(_motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
+    elif points is not None:
+        errors.append(_point_error(recording, points))
     elif is_odd and (odd := odd_winches(robot, recording)):
         errors += [_odd_winch_error(recording, each) for each in odd]
     elif error := travel or speed_error(recording) or start_orientation_error(robot, recording):
@@ -114,6 +120,21 @@ def _excessive_travel(robot: Robot, recording: Recording) -> RecordingError | No
             "[recording.columns]"
         )
     return RecordingError(recording.path, problem, hint)
+
+
+def travel_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
+    """A note where winch travel and poses differ by more than effects usually make them, for whatever cause."""
+    if {setting.name for setting in robot.effects} & EFFECTS_ON_POSES:
+        return ()
+    motion, regression = check_motion(robot, recording), length_regression(robot, recording)
+    if motion is None or regression is None or motion.misfit <= MAX_USUAL_MISFIT:
+        return ()
+    cable = int(np.argmax(regression.misfits)) + 1
+    return (
+        f"{recording.path}: winch travel is off the recorded positions by {_percentage(motion.misfit)} of the ropes' "
+        f"motion, that of cable {cable} most, and no unit, sign, order or frame that was tried explains it; ropes and "
+        f"drums usually leave less than {_percentage(MAX_USUAL_MISFIT)}: compare exit points and encoders",
+    )
 
 
 def row_number_error(robot: Robot, recording: Recording) -> RecordingError | None:
@@ -166,6 +187,16 @@ def _motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> Re
         f"{_percentage(motion.readings[0].misfit)} if {causes}"
     )
     return RecordingError(recording.path, problem, remedies)
+
+
+def _is_better(points: PointMistake | None, motion: MotionCheck) -> bool:
+    """Whether mistaken points explain far more than the readings of the recording do."""
+    return points is not None and MIN_IMPROVEMENT * points.misfit < motion.readings[0].misfit
+
+
+def _point_error(recording: Recording, points: PointMistake) -> RecordingError:
+    off = f"it is off by {_percentage(points.declared_misfit)}, by {_percentage(points.misfit)} if {points.cause}"
+    return RecordingError(recording.path, f"winch travel does not match the poses: {off}", points.remedy)
 
 
 def _odd_winch_error(recording: Recording, odd: OddWinch) -> RecordingError:

@@ -21,7 +21,7 @@ from .weight_balance import FORCE_UNITS, ForceBalance, force_balance
 Array = NDArray[np.float64]
 
 # Whatever the unit, load cells in the right order leave less than the first; in another unit, than the second.
-MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.015, 0.3
+MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.3
 # Standard deviation of the ropes' directions from which on the motion tells one load cell from another.
 MIN_DIRECTION_DEVIATION = 0.01
 EQUAL_RATIO = 1.5

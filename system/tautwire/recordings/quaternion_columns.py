@@ -25,7 +25,8 @@ def quaternion_problem(quaternion: Mapping[str, float]) -> tuple[str, str] | Non
     if not any(quaternion.values()):
         return None
     missing = [name for name, value in quaternion.items() if np.isnan(value)]
-    hint = f"write a unit quaternion, or leave all of {', '.join(quaternion)} empty where the tracker lost the platform"
+    empty = f"leave all of {', '.join(quaternion)} empty where the tracker lost the platform"
+    hint = f"write a unit quaternion, of counts with their factor and in place of angles by conversion, or {empty}"
     if missing:
         is_lost = len(missing) == len(quaternion)
         return None if is_lost else (f"has no number in {', '.join(missing)}, and has in the others", hint)

@@ -114,7 +114,7 @@ def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     radius = math.sqrt(0.5 * trace / platform.mass)
     if radius > reach:
         problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {reach:.3g}"
-        hint = "write it in kg m^2, if this is in kg mm^2 multiply by 1e-6"
+        hint = "write it in kg m^2, if this is in kg mm^2 multiply by 1e-6, in g cm^2 by 1e-7"
         yield _error(file, ("platform", "inertia"), problem, hint)
 
 

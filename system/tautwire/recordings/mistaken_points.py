@@ -1,0 +1,228 @@
+"""Mistakes in the points of a rigid platform's ropes, told by winch travel: their order, and the tracker's body.
+
+A body of markers that is turned and shifted to the platform's frame shows poses in which the ropes end at
+``R b_i + d``, with ``b_i`` the attachments in the platform's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import permutations, product
+from operator import attrgetter
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
+from ..robot.rigid_equilibrium import platform_size
+from ..robot.schema import AXES, Robot
+from .alternative_readings import WindingReading, winding_as_declared
+from .geometry_reading import GeometryReading, RecordedPoses, recorded_poses
+from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MIN_IMPROVEMENT
+from .motion_regression import centred, moving_rows, rope_motion, wound_lengths_in
+from .recording import Recording
+
+Array = NDArray[np.float64]
+
+MAX_LEFT = 0.06  # of misfits
+# Of signed axes: those that are fitted further, and how near to them a fitted frame is (rad) to be called theirs.
+FITTED_AXES, MAX_AXES_ERROR = 4, np.radians(3.0)
+# Shares of the platform's size: a shift below is not told, and none is larger.
+MIN_SHIFT, MAX_SHIFT = 0.05, 3.0
+ROWS_FITTED = 200
+
+
+@dataclass(frozen=True)
+class PointMistake:
+    """Points that are elsewhere than the robot file says: ``cause`` as a clause, and what mends it.
+
+    ``misfit`` between winch travel and poses is left of ``declared_misfit``.
+    """
+
+    cause: str
+    remedy: str
+    misfit: float
+    declared_misfit: float
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """A rigid platform's poses in the rows where it moves, and the lengths wound (M, n) in m about their means."""
+
+    robot: Robot
+    poses: RecordedPoses
+    wound: Array
+
+    @cached_property
+    def declared_misfit(self) -> float:
+        """Misfit of the points as declared."""
+        return self.misfit(self.robot)
+
+    @property
+    def winding(self) -> WindingReading:
+        return winding_as_declared(self.robot.cable_count)
+
+    def lengths(self, robot: Robot) -> Array:
+        """Rope lengths (M, n) in m about their means of a robot with other points."""
+        return centred(np.nan_to_num(GeometryReading().directions(robot, self.poses)[0]))
+
+    def misfit(self, robot: Robot) -> float:
+        """Misfit between these lengths and what was wound."""
+        return rope_motion(robot, GeometryReading(), self.poses).misfit(self.wound, self.winding)
+
+
+def point_mistake(robot: Robot, recording: Recording) -> PointMistake | None:
+    """The mistake in attachments, anchors or the tracker's body that explains what was wound; None where none does.
+
+    Tried are other orders of the attachments or of the anchors, of the quaternion's vector with signs, other axes of
+    the attachments and, where none of these explains it nearly as well, a frame of theirs that is turned and shifted.
+    """
+    rows = moving_rows(robot, recording) if robot.platform.is_rigid_body else None
+    if rows is None or not recording.has_orientation:
+        return None
+    motion = _Motion(robot, recorded_poses(recording, rows), wound_lengths_in(rows, recording))
+    limit = min(motion.declared_misfit / MIN_IMPROVEMENT, MAX_LEFT)
+    axes = _likely_axes(motion)
+    exact = [*_in_another_order(motion), *_with_another_vector(motion), *_along_other_axes(motion, axes)]
+    fitted = min(_in_fitted_frames(motion, axes), key=attrgetter("misfit"))
+    simple = min(exact, key=attrgetter("misfit"))
+    best = simple if simple.misfit <= EQUAL_RATIO * fitted.misfit + EQUAL_DIFFERENCE else fitted
+    return best if best.misfit <= limit else None
+
+
+def _in_another_order(motion: _Motion) -> Iterator[PointMistake]:
+    """Orders of attachments, and of anchors, by linear assignment of each winch to the rope that it may have moved."""
+    count = motion.robot.cable_count
+    for key in ("attachment", "anchor"):
+        costs = np.empty((count, count))
+        for shift in range(count):
+            sources = np.roll(np.arange(count), -shift)
+            missed = motion.lengths(_reordered(motion.robot, key, sources.tolist())) + motion.wound
+            costs[np.arange(count), sources] = np.sum(missed**2, axis=0)
+        order = linear_sum_assignment(costs)[1].tolist()
+        if order == list(range(count)):
+            continue
+        moved = [cable for cable, source in enumerate(order) if cable != source]
+        names, others = _numbers(moved), _numbers([order[cable] for cable in moved])
+        yield PointMistake(
+            f"the {key}s of cables {names} in the robot file are those of cables {others}",
+            f"give cables {names} the {key}s of cables {others}",
+            motion.misfit(_reordered(motion.robot, key, order)),
+            motion.declared_misfit,
+        )
+
+
+def _numbers(cables: list[int]) -> str:
+    return ", ".join(str(cable + 1) for cable in cables)
+
+
+def _reordered(robot: Robot, key: str, sources: list[int]) -> Robot:
+    points = [getattr(robot.cables[source], key) for source in sources]
+    cables = tuple(replace(cable, **{key: point}) for cable, point in zip(robot.cables, points, strict=True))
+    return replace(robot, cables=cables)
+
+
+def _with_another_vector(motion: _Motion) -> Iterator[PointMistake]:
+    """Orders and signs of the quaternion's qx, qy, qz."""
+    shown = motion.poses.orientation
+    for matrix in _signed_axes():
+        names = _axes_text(matrix, "q")
+        poses = RecordedPoses(motion.poses.position, np.column_stack([shown[:, 0], shown[:, 1:] @ matrix.T]))
+        yield PointMistake(
+            f"the platform's qx, qy, qz are the recorded {names}",
+            f"write the columns {names} as qx, qy, qz",
+            replace(motion, poses=poses).misfit(motion.robot),
+            motion.declared_misfit,
+        )
+
+
+def _along_other_axes(motion: _Motion, axes: Sequence[Array]) -> Iterator[PointMistake]:
+    """Attachments along other axes."""
+    for matrix in axes:
+        if not np.array_equal(matrix, np.eye(len(AXES))):
+            yield _frame_mistake(motion, matrix, np.zeros(len(AXES)))
+
+
+def _in_fitted_frames(motion: _Motion, axes: Sequence[Array]) -> Iterator[PointMistake]:
+    """Frames of the attachments that are turned and shifted as fits best, near likely axes."""
+    reach = MAX_SHIFT * platform_size(motion.robot)
+    for matrix in axes:
+        rotation, shift = _fitted_frame(motion, matrix)
+        yield _frame_mistake(motion, rotation, shift if np.linalg.norm(shift) <= reach else np.zeros(len(AXES)))
+
+
+def _likely_axes(motion: _Motion) -> list[Array]:
+    """The signed axes along which attachments fit best."""
+    unshifted = np.zeros(len(AXES))
+    axes = [np.eye(len(AXES)), *_signed_axes()]
+    return sorted(axes, key=lambda matrix: motion.misfit(_moved(motion.robot, matrix, unshifted)))[:FITTED_AXES]
+
+
+def _signed_axes() -> list[Array]:
+    """Matrices (3, 3) that map a vector on its components in other orders and with other signs."""
+    identity = np.eye(len(AXES))
+    matrices = [
+        identity[list(order)] * np.array(signs)[:, None]
+        for order, signs in product(permutations(range(len(AXES))), product((1.0, -1.0), repeat=len(AXES)))
+    ]
+    return [matrix for matrix in matrices if not np.array_equal(matrix, identity)]
+
+
+def _axes_text(matrix: Array, prefix: str = "") -> str:
+    """As in "y, -x, z"."""
+    rows = [(row.sum(), AXES[int(np.argmax(np.abs(row)))]) for row in matrix]
+    return ", ".join(f"{'-' if sign < 0.0 else ''}{prefix}{axis}" for sign, axis in rows)
+
+
+def _fitted_frame(motion: _Motion, matrix: Array) -> tuple[Array, Array]:
+    """The orthogonal matrix near another, and the shift in m, with which attachments fit best."""
+    step = max(1, len(motion.wound) // ROWS_FITTED)
+    poses = RecordedPoses(motion.poses.position[::step], motion.poses.orientation[::step])
+    part = _Motion(motion.robot, poses, centred(motion.wound[::step]))
+
+    def frame(parameters: Array) -> tuple[Array, Array]:
+        return Rotation.from_rotvec(parameters[:3]).as_matrix() @ matrix, parameters[3:]
+
+    def missed(parameters: Array) -> Array:
+        return np.asarray((part.lengths(_moved(motion.robot, *frame(parameters))) + part.wound).ravel())
+
+    scale = np.concatenate([np.ones(3), np.full(3, platform_size(motion.robot))])
+    return frame(least_squares(missed, np.zeros(6), x_scale=scale, loss="soft_l1").x)
+
+
+def _moved(robot: Robot, matrix: Array, shift: Array) -> Robot:
+    cables = tuple(
+        replace(cable, attachment=tuple((matrix @ np.array(cable.attachment) + shift).tolist()))
+        for cable in robot.cables
+    )
+    return replace(robot, cables=cables)
+
+
+def _frame_mistake(motion: _Motion, rotation: Array, shift: Array) -> PointMistake:
+    size = platform_size(motion.robot)
+    nearest = np.zeros_like(rotation)
+    largest = np.argmax(np.abs(rotation), axis=1)
+    nearest[range(len(AXES)), largest] = np.sign(rotation[range(len(AXES)), largest])
+    angle = float(np.arccos(np.clip((np.trace(rotation @ nearest.T) - 1.0) / 2.0, -1.0, 1.0)))
+    matrix = nearest if angle <= MAX_AXES_ERROR else rotation
+    offset = shift if np.linalg.norm(shift) > MIN_SHIFT * size else np.zeros(len(AXES))
+    parts = []
+    if matrix is nearest and not np.array_equal(nearest, np.eye(len(AXES))):
+        mirrored = ", mirrored" if np.linalg.det(nearest) < 0.0 else ""
+        parts.append(f"their {_axes_text(nearest)} are x, y, z of the recorded pose{mirrored}")
+    elif matrix is not nearest:
+        degrees = np.degrees(Rotation.from_matrix(rotation * np.linalg.det(rotation)).magnitude())
+        parts.append(f"turned by about {degrees:.3g} degrees")
+    written = ", ".join(f"{coordinate:.3g}" for coordinate in offset)
+    parts += [f"shifted by about [{written}] m"] if offset.any() else []
+    rows = ", ".join("[" + ", ".join(f"{entry:.4g}" for entry in row) + "]" for row in matrix)
+    return PointMistake(
+        f"the attachments are in another frame than the recorded pose: {' and '.join(parts)}",
+        "record the pose of the robot file's frame, or write R b + d in place of each attachment b, with "
+        f"R = [{rows}] and d = [{written}] m, and of the centre of mass",
+        motion.misfit(_moved(motion.robot, matrix, offset)),
+        motion.declared_misfit,
+    )
