@@ -173,6 +173,18 @@ def test_any_order_of_eight_load_cells_is_told(order: list[int]) -> None:
     assert f"load cells of cables 1 to 8 are {cells}" in error.problem
 
 
+def test_swapped_load_cells_are_told_beside_gains_that_err_by_some_per_cent() -> None:
+    robot = crane_robot()
+    recording = noisy(wandering_recording(robot))
+    gains = 1.0 + 0.018 * np.array([1, -1, -1, 1, 1, -1, 1, -1])
+    erring = tensions(recording, gains)
+    check = checked(robot, erring)
+    assert check is not None and 0.015 < check.misfit < 0.03 and check.mistakes == ()
+    swapped = replace(erring, tension=erring.tension[:, [0, 2, 1, *range(3, 8)]])
+    (error,) = recording_mistakes(robot, swapped)
+    assert "are tension_1, tension_3, tension_2, tension_4" in error.problem
+
+
 def test_load_cells_in_a_circle_are_told() -> None:
     robot, recording = shipped("caroca")
     (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, [1, 2, 0]]))

@@ -127,6 +127,7 @@ FRAMES = {
 }
 
 
+@pytest.mark.validate(but=["z down", "origin"])
 @pytest.mark.parametrize("frame", FRAMES)
 def test_the_frame_of_a_tracker_is_told_whatever_its_clock(monkeypatch: pytest.MonkeyPatch, frame: str) -> None:
     change, causes = FRAMES[frame]
@@ -149,6 +150,7 @@ def _read(tracker: Recording, axis: str, column: dict[str, Any]) -> np.ndarray:
     return np.asarray(column.get("sign", 1.0) * unit * (source - column.get("offset", 0.0)))
 
 
+@pytest.mark.validate
 def test_another_motion_is_no_mistake_of_the_frame() -> None:
     log, tracker = files("three")
     random = np.random.default_rng(3)
@@ -157,7 +159,7 @@ def test_another_motion_is_no_mistake_of_the_frame() -> None:
     assert frame_mistakes(example("three"), log, replace(tracker, position=other)) == ()
 
 
-@pytest.mark.validate(but=["cm"])
+@pytest.mark.validate
 @pytest.mark.parametrize(("stated", "unit", "size"), [("cm", "mm", 1e3), ("mm", "m", 1.0)])
 def test_a_unit_that_is_stated_wrongly_is_told(
     monkeypatch: pytest.MonkeyPatch, stated: str, unit: str, size: float

@@ -29,7 +29,6 @@ TIME_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["time"]}
 SPEED_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["speed"]}
 LENGTH_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["length"]}
 ANCHOR_UNITS = ("m", "cm", "mm", "in", "ft")
-# On a rigid platform.
 ATTACHMENT_UNITS = ("m", "cm", "mm")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import permutations, product
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ..robot.schema import Robot
 from .alternative_readings import ANCHOR_UNITS, ATTACHMENT_UNITS, LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, WindingReading
-from .geometry_reading import GeometryReading, QuaternionReading
+from .geometry_reading import GeometryReading, QuaternionReading, signed_axes
 from .motion_regression import moves_along_two_axes
 
 Array = NDArray[np.float64]
@@ -22,8 +22,8 @@ MIN_UNIT_RATIO, MAX_UNIT_ERROR = 1.25, 0.01
 MAX_RATIO_SPREAD = 0.03
 # Ratios of geometric to wound lengths that drums and ropes that give may have, whatever the unit.
 GIVING_ROPES = (0.5, 4.0)
-# Beyond the ratio it is a gear's if it leaves this share of what is missed at most, and cables differ by no more.
-MIN_GEAR_RATIO, MAX_GEAR_SHARE, MAX_GEAR_SPREAD = 1.25, 0.1, 0.1
+# Beyond the ratio it is a gear's if it leaves this share of what is missed at most.
+MIN_GEAR_RATIO, MAX_GEAR_SHARE = 1.25, 0.1
 LONG_TIME_UNITS = ("min", "h", "d")
 SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 
@@ -33,7 +33,7 @@ def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
 
     Of rigid platforms also other poses, and attachments in another unit.
     """
-    for axes, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
+    for axes, signs in signed_axes():
         for unit in LENGTH_UNITS:
             yield GeometryReading(unit, "m", axes, signs)
     for unit in ANCHOR_UNITS[1:]:
@@ -84,9 +84,8 @@ def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[
             yield WindingReading(time_unit, speed_unit, signs, order)
         sizes = [TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit] for time_unit, speed_unit in units]
         is_unit = any(abs(ratio / size - 1.0) <= MAX_UNIT_ERROR for size in sizes)
-        is_of_gear = _is_of_gear(lengths, np.array(signs) * wound[:, order], ratio)
         is_of_angle = not GIVING_ROPES[0] < ratio < GIVING_ROPES[1] and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio
-        if not is_unit and (is_of_angle or (is_of_gear and np.ptp(moving) <= MAX_GEAR_SPREAD * ratio)):
+        if not is_unit and (is_of_angle or _is_of_gear(lengths, np.array(signs) * wound[:, order], ratio)):
             for time_unit, size in TIME_UNITS.items():
                 if SAMPLE_INTERVALS[0] <= interval * size <= SAMPLE_INTERVALS[1]:
                     yield WindingReading(time_unit, None, signs, order, ratio / size)

@@ -72,16 +72,16 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     travel = None if _follows(motion) else _excessive_travel(robot, recording)
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
-    is_odd = motion is not None and not _follows(motion)
-    if is_odd and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
+    is_off = motion is not None and not _follows(motion)
+    if is_off and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
         return (error,)
-    points = point_mistake(robot, recording) if is_odd else None
+    points = point_mistake(robot, recording) if is_off else None
     if motion is not None and motion.readings and not _is_better(points, motion):
         errors.append(_motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
-    elif points is not None:
-        errors.append(_point_error(recording, points))
-    elif is_odd and (odd := odd_winches(robot, recording)):
+    elif motion is not None and points is not None:
+        errors.append(_point_error(recording, motion, points))
+    elif is_off and (odd := odd_winches(robot, recording)):
         errors += [_odd_winch_error(recording, each) for each in odd]
     elif error := travel or speed_error(recording) or start_orientation_error(robot, recording):
         return (error,)
@@ -194,8 +194,8 @@ def _is_better(points: PointMistake | None, motion: MotionCheck) -> bool:
     return points is not None and MIN_IMPROVEMENT * points.misfit < motion.readings[0].misfit
 
 
-def _point_error(recording: Recording, points: PointMistake) -> RecordingError:
-    off = f"it is off by {_percentage(points.declared_misfit)}, by {_percentage(points.misfit)} if {points.cause}"
+def _point_error(recording: Recording, motion: MotionCheck, points: PointMistake) -> RecordingError:
+    off = f"it is off by {_percentage(motion.misfit)}, by {_percentage(points.misfit)} if {points.cause}"
     return RecordingError(recording.path, f"winch travel does not match the poses: {off}", points.remedy)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ..robot.schema import AXES, Robot
 from .alternative_readings import LENGTH_UNITS
-from .geometry_reading import GeometryReading, RecordedPoses
+from .geometry_reading import GeometryReading, RecordedPoses, signed_axes
 
 Array = NDArray[np.float64]
 
@@ -82,7 +81,7 @@ def _nearest_axes(orthogonal: Array, unit: str) -> tuple[GeometryReading, float]
     """The signed order of axes nearest to an orthogonal matrix, its mirror image included, and the angle in between."""
     sides = [
         (order, signs)
-        for order, signs in product(permutations(range(len(AXES))), product((1, -1), repeat=len(AXES)))
+        for order, signs in signed_axes()
         if np.linalg.det(np.eye(len(AXES))[list(order)] * np.array(signs)[:, None]) * np.linalg.det(orthogonal) > 0.0
     ]
 

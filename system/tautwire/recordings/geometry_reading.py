@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,11 @@ class RecordedPoses:
     def has_orientation(self) -> bool:
         """Whether the orientation was measured in any sample."""
         return bool(np.isfinite(self.orientation).any())
+
+
+def signed_axes() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """The 48 orders of axes with signs, mirrored ones too, by which a point may be read; the first is as shown."""
+    return list(product(permutations(range(len(AXES))), product((1, -1), repeat=len(AXES))))
 
 
 def recorded_poses(recording: Recording, rows: NDArray[np.int64] | slice = slice(None)) -> RecordedPoses:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import permutations, product
 from operator import attrgetter
 
 import numpy as np
@@ -19,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import AXES, Robot
-from .alternative_readings import WindingReading, winding_as_declared
-from .geometry_reading import GeometryReading, RecordedPoses, recorded_poses
+from .alternative_readings import winding_as_declared
+from .geometry_reading import GeometryReading, RecordedPoses, recorded_poses, signed_axes
 from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MIN_IMPROVEMENT
 from .motion_regression import centred, moving_rows, rope_motion, wound_lengths_in
 from .recording import Recording
@@ -37,15 +35,11 @@ ROWS_FITTED = 200
 
 @dataclass(frozen=True)
 class PointMistake:
-    """Points that are elsewhere than the robot file says: ``cause`` as a clause, and what mends it.
-
-    ``misfit`` between winch travel and poses is left of ``declared_misfit``.
-    """
+    """Points elsewhere than the robot file says: the ``cause`` as a clause, what mends it, and the misfit then left."""
 
     cause: str
     remedy: str
     misfit: float
-    declared_misfit: float
 
 
 @dataclass(frozen=True)
@@ -56,22 +50,14 @@ class _Motion:
     poses: RecordedPoses
     wound: Array
 
-    @cached_property
-    def declared_misfit(self) -> float:
-        """Misfit of the points as declared."""
-        return self.misfit(self.robot)
-
-    @property
-    def winding(self) -> WindingReading:
-        return winding_as_declared(self.robot.cable_count)
-
     def lengths(self, robot: Robot) -> Array:
         """Rope lengths (M, n) in m about their means of a robot with other points."""
         return centred(np.nan_to_num(GeometryReading().directions(robot, self.poses)[0]))
 
     def misfit(self, robot: Robot) -> float:
         """Misfit between these lengths and what was wound."""
-        return rope_motion(robot, GeometryReading(), self.poses).misfit(self.wound, self.winding)
+        winding = winding_as_declared(robot.cable_count)
+        return rope_motion(robot, GeometryReading(), self.poses).misfit(self.wound, winding)
 
 
 def point_mistake(robot: Robot, recording: Recording) -> PointMistake | None:
@@ -84,7 +70,7 @@ def point_mistake(robot: Robot, recording: Recording) -> PointMistake | None:
     if rows is None or not recording.has_orientation:
         return None
     motion = _Motion(robot, recorded_poses(recording, rows), wound_lengths_in(rows, recording))
-    limit = min(motion.declared_misfit / MIN_IMPROVEMENT, MAX_LEFT)
+    limit = min(motion.misfit(robot) / MIN_IMPROVEMENT, MAX_LEFT)
     axes = _likely_axes(motion)
     exact = [*_in_another_order(motion), *_with_another_vector(motion), *_along_other_axes(motion, axes)]
     fitted = min(_in_fitted_frames(motion, axes), key=attrgetter("misfit"))
@@ -111,7 +97,6 @@ def _in_another_order(motion: _Motion) -> Iterator[PointMistake]:
             f"the {key}s of cables {names} in the robot file are those of cables {others}",
             f"give cables {names} the {key}s of cables {others}",
             motion.misfit(_reordered(motion.robot, key, order)),
-            motion.declared_misfit,
         )
 
 
@@ -135,7 +120,6 @@ def _with_another_vector(motion: _Motion) -> Iterator[PointMistake]:
             f"the platform's qx, qy, qz are the recorded {names}",
             f"write the columns {names} as qx, qy, qz",
             replace(motion, poses=poses).misfit(motion.robot),
-            motion.declared_misfit,
         )
 
 
@@ -164,10 +148,7 @@ def _likely_axes(motion: _Motion) -> list[Array]:
 def _signed_axes() -> list[Array]:
     """Matrices (3, 3) that map a vector on its components in other orders and with other signs."""
     identity = np.eye(len(AXES))
-    matrices = [
-        identity[list(order)] * np.array(signs)[:, None]
-        for order, signs in product(permutations(range(len(AXES))), product((1.0, -1.0), repeat=len(AXES)))
-    ]
+    matrices = [identity[list(axes)] * np.array(signs)[:, None] for axes, signs in signed_axes()]
     return [matrix for matrix in matrices if not np.array_equal(matrix, identity)]
 
 
@@ -202,27 +183,31 @@ def _moved(robot: Robot, matrix: Array, shift: Array) -> Robot:
 
 
 def _frame_mistake(motion: _Motion, rotation: Array, shift: Array) -> PointMistake:
-    size = platform_size(motion.robot)
-    nearest = np.zeros_like(rotation)
-    largest = np.argmax(np.abs(rotation), axis=1)
-    nearest[range(len(AXES)), largest] = np.sign(rotation[range(len(AXES)), largest])
-    angle = float(np.arccos(np.clip((np.trace(rotation @ nearest.T) - 1.0) / 2.0, -1.0, 1.0)))
-    matrix = nearest if angle <= MAX_AXES_ERROR else rotation
-    offset = shift if np.linalg.norm(shift) > MIN_SHIFT * size else np.zeros(len(AXES))
+    nearest, angle = _nearest_axes(rotation)
+    is_of_axes = angle <= MAX_AXES_ERROR
+    matrix = nearest if is_of_axes else rotation
+    is_shifted = np.linalg.norm(shift) > MIN_SHIFT * platform_size(motion.robot)
+    offset = shift if is_shifted else np.zeros(len(AXES))
     parts = []
-    if matrix is nearest and not np.array_equal(nearest, np.eye(len(AXES))):
-        mirrored = ", mirrored" if np.linalg.det(nearest) < 0.0 else ""
-        parts.append(f"their {_axes_text(nearest)} are x, y, z of the recorded pose{mirrored}")
-    elif matrix is not nearest:
+    if not is_of_axes:
         degrees = np.degrees(Rotation.from_matrix(rotation * np.linalg.det(rotation)).magnitude())
         parts.append(f"turned by about {degrees:.3g} degrees")
+    elif not np.array_equal(nearest, np.eye(len(AXES))):
+        mirrored = ", mirrored" if np.linalg.det(nearest) < 0.0 else ""
+        parts.append(f"their {_axes_text(nearest)} are x, y, z of the recorded pose{mirrored}")
     written = ", ".join(f"{coordinate:.3g}" for coordinate in offset)
-    parts += [f"shifted by about [{written}] m"] if offset.any() else []
+    parts += [f"shifted by about [{written}] m"] if is_shifted else []
     rows = ", ".join("[" + ", ".join(f"{entry:.4g}" for entry in row) + "]" for row in matrix)
     return PointMistake(
         f"the attachments are in another frame than the recorded pose: {' and '.join(parts)}",
         "record the pose of the robot file's frame, or write R b + d in place of each attachment b, with "
         f"R = [{rows}] and d = [{written}] m, and of the centre of mass",
         motion.misfit(_moved(motion.robot, matrix, offset)),
-        motion.declared_misfit,
     )
+
+
+def _nearest_axes(rotation: Array) -> tuple[Array, float]:
+    """The signed axes nearest to an orthogonal matrix, and the angle in between, in rad."""
+    largest = np.argmax(np.abs(rotation), axis=1)
+    nearest = np.eye(len(AXES))[largest] * np.sign(rotation[range(len(AXES)), largest])[:, None]
+    return nearest, float(np.arccos(np.clip((np.trace(rotation @ nearest.T) - 1.0) / 2.0, -1.0, 1.0)))
