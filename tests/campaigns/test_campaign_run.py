@@ -108,7 +108,7 @@ def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     assert one["end_z"] == motion.position[-1, 2]
 
 
-@pytest.mark.validate(but=["winch"])
+@pytest.mark.validate
 @pytest.mark.parametrize("changed", ["damping", "winch", "eight"])
 def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tmp_path: Path) -> None:
     base = example("eight" if changed == "eight" else "three")
@@ -183,7 +183,7 @@ def test_a_path_is_read_by_the_columns_of_the_robot_file(tmp_path: Path) -> None
     np.testing.assert_allclose(speeds, [[-0.001, -0.002, -0.003]] * 2)
 
 
-@pytest.mark.validate(but=["20.0"])
+@pytest.mark.validate
 @pytest.mark.parametrize("softness", [0.0, 20.0])
 def test_a_cable_is_slack_where_nothing_pulls_at_it(softness: float, tmp_path: Path) -> None:
     # Paid out faster than the platform falls, then held.

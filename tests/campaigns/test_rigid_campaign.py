@@ -112,6 +112,7 @@ def test_the_page_has_angles_in_mrad_and_quaternions_without_a_unit(tmp_path: Pa
     assert "mrad" in table.partition("path error angle rms")[2][:40]
 
 
+@pytest.mark.validate
 def test_cached_fmus_have_the_numbers_of_the_run(tmp_path: Path) -> None:
     """FMUs of the declared robot with other parameters move as FMUs that were built with these numbers."""
     head = VARIED.replace("count = 2", "count = 1")

@@ -30,6 +30,7 @@ def simulated(folder: Path, controller: Path) -> pd.DataFrame:
     return pd.read_csv(out)
 
 
+@pytest.mark.validate
 def test_files_of_each_kind_close_the_loop(tmp_path: Path) -> None:
     robot = example("three")
     path = Line(robot.platform.start, (28.9, 0.05, 5.1), 1.0)

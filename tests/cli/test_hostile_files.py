@@ -172,6 +172,7 @@ def test_any_recording_is_read_or_refused(
             reported_by_check([str(ROBOT), str(place)], place, capsys, None)
 
 
+@pytest.mark.validate
 @settings(HOSTILE, max_examples=40)
 @given(content=same_recordings(RECORDED))
 def test_the_same_recording_otherwise_written_is_the_same(tmp_path: Path, content: bytes) -> None:
@@ -304,7 +305,7 @@ main()
 """
 
 
-@pytest.mark.validate(but=["noise"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("content", "reader"), [("zip", "build"), ("gzip", "table"), ("Parquet", "fit"), ("MDF", "fit"), ("noise", "fit")]
 )

@@ -308,6 +308,7 @@ def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> 
     assert names(tmp_path) == ["workspace.csv", "workspace.csv-metadata.json"]
 
 
+@pytest.mark.validate
 @linux
 def test_what_is_wrong_does_not_end_up_in_the_result(tmp_path: Path) -> None:
     command = " ".join([*COMMAND, "linearise", str(tmp_path / "absent.toml"), "--json", "--out", "a.json"])

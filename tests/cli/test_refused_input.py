@@ -192,6 +192,7 @@ def test_a_port_that_is_missing_is_named_before_anything_runs(
     assert not (tmp_path / "out.csv").exists()
 
 
+@pytest.mark.validate
 def test_build_does_not_write_over_a_users_fmu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["build", ROBOT, "--out", str(tmp_path)]) == 0
     robot = str(edited(tmp_path, "[platform]", "[fmu]\nplatform = 'platform.fmu'\n\n[platform]"))

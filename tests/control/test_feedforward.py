@@ -80,7 +80,7 @@ def test_rope_is_let_out_for_the_stretch_also_where_the_acceleration_jumps() -> 
     assert np.trapezoid(speeds, dx=0.01, axis=0) == pytest.approx(expected, abs=2e-5)
 
 
-@pytest.mark.validate(but=["three"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", sorted(PATHS))
 def test_stretch_is_cancelled_in_the_co_simulation(name: str, tmp_path: Path) -> None:
     robot, path = example(name), PATHS[name]

@@ -124,7 +124,7 @@ def test_closed_loop_follows_a_path_that_the_open_loop_misses(name: str, fmus: d
     assert closed.tension.min() > 0.9 * path_tensions(robot, path, closed.time).min()
 
 
-@pytest.mark.validate(but=["three"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", NAMES)
 def test_noise_of_the_sensors_stays_noise(name: str, fmus: dict[str, RobotFmus]) -> None:
     robot, path = robot_named(name), PATHS[name]

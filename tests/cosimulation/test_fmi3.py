@@ -42,6 +42,7 @@ def test_the_test_fmu_is_valid(winch: Path) -> None:
     assert validate_fmu(str(winch)) == []
 
 
+@pytest.mark.validate(but=["chosen1"])
 @needs_compiler
 @pytest.mark.parametrize("chosen", [{"step": 0.01}, {"tolerance": 1e-5}])
 def test_the_same_winch_by_either_version_gives_the_same_figures(
@@ -152,6 +153,7 @@ def test_every_call_is_noted_by_its_name(winch: Path, tmp_path: Path, method: st
         assert reader.last_entry() == CallEntry("winch", call, 0.75 if method == "step" else 0.5, {}, ())
 
 
+@pytest.mark.validate
 @needs_compiler
 def test_other_names_of_a_variable_are_as_good(tmp_path: Path, winch: Path) -> None:
     command = '<Float64 name="speed_command" valueReference="0" causality="input" declaredType="Speed" start="0"'

@@ -258,6 +258,7 @@ run(Path(sys.argv[1]), patience=600.0)
 """
 
 
+@pytest.mark.validate(but=["2"])
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
 def test_ending_the_parent_process_ends_the_isolated_run(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch, ending: signal.Signals

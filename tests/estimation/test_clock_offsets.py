@@ -55,6 +55,7 @@ def test_a_sensor_that_is_late_in_both_is_left_to_the_effect(kind: str) -> None:
     assert evidence.estimation.recording is recorded("three", 1, LATE[kind])
 
 
+@pytest.mark.validate
 def test_a_delay_of_half_a_swing_in_both_is_no_clock() -> None:
     late = {"sensor_delay": {"seconds": 0.1}}
     _, notes, _ = clocks_set("caroca", recorded("caroca", 1, late), recorded("caroca", 2, late))
@@ -69,7 +70,7 @@ def test_positions_before_their_motion_are_a_clock_even_in_both() -> None:
     assert all("ahead of the winch speeds, so they precede the motion" in note for note in notes)
 
 
-@pytest.mark.validate(but=["friction"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     "effects",
     [

@@ -54,6 +54,7 @@ def test_each_call_is_answered_by_its_number(count: int) -> None:
         assert workers.submit(square, 6).result() == 36
 
 
+@pytest.mark.validate
 def test_one_worker_is_this_process_and_two_are_others(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()

@@ -90,12 +90,14 @@ def test_lqg_gives_the_same_numbers_as_fmu(name: str, tmp_path: Path) -> None:
     assert difference(robot, build_fmus(robot, tmp_path), design_controller(robot), tmp_path, pushed=True) < 1e-9
 
 
+@pytest.mark.validate
 def test_scheduled_and_pure_feedforward_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     scheduled = schedule_controller(three, PATHS["three"], points=4)
     assert difference(three, three_example_fmus, scheduled, tmp_path) < 1e-9
     assert difference(three, three_example_fmus, Feedforward(3), tmp_path) < 1e-9
 
 
+@pytest.mark.validate
 def test_shaped_path_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     path = shape_along(three, PATHS["three"], "EI")
     assert difference(three, three_example_fmus, Feedforward(3), tmp_path, moved=path) < 1e-9

@@ -267,6 +267,7 @@ def test_parameters_outside_their_bounds_are_refused(
         assert block.values[0] == float(instance.variables[name].start)
 
 
+@pytest.mark.validate
 def test_refused_parameters_leave_the_process_alive(three_fmus: RobotFmus) -> None:
     for _ in range(5):
         with in_hand(three_fmus.platform) as platform:

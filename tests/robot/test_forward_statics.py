@@ -31,6 +31,7 @@ def test_lengths_lead_back_to_the_pose(robot: Robot) -> None:
     assert rope_lengths(robot, at, quaternion, held.tensions) == pytest.approx(held.lengths, abs=1e-9)
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize(
     "robot",
     (suspended_robot(3), suspended_robot(4), heavy(suspended_robot(4), 0.2), underactuated_robot()),
@@ -47,6 +48,7 @@ def test_few_cables_lead_back_to_the_pose_in_equilibrium(robot: Robot) -> None:
     assert all(pose.residual < 1e-8 for pose in poses)
 
 
+@pytest.mark.validate
 def test_lengths_that_no_equilibrium_has_lead_nowhere() -> None:
     assert forward_kinematics_of_ropes(suspended_robot(4), (1.0, 9.0, 1.0, 9.0)) == ()
     with pytest.raises(ArgumentError, match="one length a cable"):

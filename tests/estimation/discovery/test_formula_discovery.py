@@ -65,6 +65,7 @@ def test_a_machine_that_shakes() -> None:
     assert pace == same == pytest.approx(10.6814, rel=1e-4)
 
 
+@pytest.mark.validate
 def test_a_formula_of_the_robot_file_stays() -> None:
     half = replace(ROBOT, formulas=(Formula("force_x", "-30*vy"),))
     result = discovered({"unlisted_sideways": {"constant": 30.0}}, robot=half)

@@ -138,6 +138,7 @@ def test_without_one_load_cell_the_other_cables_are_still_localised() -> None:
     assert "cable 3" in components.limitations[0]
 
 
+@pytest.mark.validate
 def test_dropouts_do_no_harm() -> None:
     recording = recorded("three", 3, gap=(5.0, 5.6))
     position, tension = recording.position.copy(), recording.tension.copy()
@@ -174,6 +175,7 @@ def test_faults_of_other_robots_are_localised(name: str) -> None:
     )
 
 
+@pytest.mark.validate
 def test_errors_of_recorded_lengths_are_expected_in_the_place_of_a_drift() -> None:
     robot, recording = example("three"), recorded("three", 3)
     noise = replace(estimate_noise(robot, recording), rope_lengths=(OrnsteinUhlenbeck(1e-4, 5.0),) * 3)
@@ -357,6 +359,7 @@ def test_friction_that_uncertain_exit_points_hide_at_its_cable_is_not_put_on_the
     assert components.faulty_component == "platform; load cells 1, 2 or friction before them"
 
 
+@pytest.mark.validate
 def test_a_payload_within_what_load_cells_may_be_off_by_is_no_fault_of_the_platform() -> None:
     robot, recording = example("three"), recorded("three", 3, {"payload": {"mass": 6.0}})
     weight = 6.0 * 9.81
