@@ -28,8 +28,7 @@ Array = NDArray[np.float64]
 MAX_LEFT = 0.06  # of misfits
 # Of signed axes: those that are fitted further, and how near to them a fitted frame is (rad) to be called theirs.
 FITTED_AXES, MAX_AXES_ERROR = 4, np.radians(3.0)
-# Shares of the platform's size: a shift below is not told, and none is larger.
-MIN_SHIFT, MAX_SHIFT = 0.05, 3.0
+MIN_SHIFT = 0.05  # of the platform's size, to be told
 ROWS_FITTED = 200
 
 
@@ -131,11 +130,9 @@ def _along_other_axes(motion: _Motion, axes: Sequence[Array]) -> Iterator[PointM
 
 
 def _in_fitted_frames(motion: _Motion, axes: Sequence[Array]) -> Iterator[PointMistake]:
-    """Frames of the attachments that are turned and shifted as fits best, near likely axes."""
-    reach = MAX_SHIFT * platform_size(motion.robot)
-    for matrix in axes:
-        rotation, shift = _fitted_frame(motion, matrix)
-        yield _frame_mistake(motion, rotation, shift if np.linalg.norm(shift) <= reach else np.zeros(len(AXES)))
+    """Frames of the attachments that are turned and shifted as fits best, near likely axes or their own."""
+    for matrix in (np.eye(len(AXES)), *axes):
+        yield _frame_mistake(motion, *_fitted_frame(motion, matrix))
 
 
 def _likely_axes(motion: _Motion) -> list[Array]:
