@@ -31,7 +31,7 @@ def call_for_ever(self, count, *arguments):
     room = np.zeros(10**6)
     pointers = (ctypes.c_void_p * 50)(*[room.ctypes.data] * 48, self._constants.ctypes.data, room.ctypes.data)
     Path("inside").touch()
-    self._native_run(2**62, pointers, (ctypes.c_int64 * 50)())
+    self._native_run(0, 2**62, pointers, (ctypes.c_int64 * 50)())
 
 if __name__ == "__main__":
     tautwire.estimation.processors = lambda: int(os.environ["PROCESSES"])

@@ -19,8 +19,8 @@ from tests.support.robots import example
 ROBOT = example("three")
 RECORDING = recorded("three", 1).first(400)
 HYSTERESIS = next(h for h in hypotheses(ROBOT) if h.effect.name == "hysteresis" and h.cables == ROBOT.cable_numbers)
-# Ten billion newtons for a strain of one: more than the steps of a filter made for 20 N in 1e-4 can follow.
-TOO_STIFF = replace(HYSTERESIS.setting(ROBOT), values={**HYSTERESIS.setting(ROBOT).values, "force": 1e6})
+# A hundred billion newtons for a strain of one: more than the steps of a filter made for 20 N in 1e-4 can follow.
+TOO_STIFF = replace(HYSTERESIS.setting(ROBOT), values={**HYSTERESIS.setting(ROBOT).values, "force": 1e7})
 
 
 def test_a_fit_whose_start_has_no_finite_output_begins_at_the_default_values() -> None:

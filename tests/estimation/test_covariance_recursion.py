@@ -13,9 +13,17 @@ from casadi import SX, Function, horzcat, mtimes, vertcat
 from numpy.typing import NDArray
 
 from tautwire.estimation import covariance_recursion, disturbance_sensitivities, step_integration
-from tautwire.estimation.covariance_recursion import STEP_INTEGRATION_SHA256, Moments, Record, Samples, run_recursion
+from tautwire.estimation.covariance_recursion import (
+    STEP_INTEGRATION_SHA256,
+    Functions,
+    Moments,
+    Record,
+    Samples,
+    recursion_buffers,
+    run_recursion,
+)
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
-from tautwire.estimation.step_integration import Division, Integration, Step
+from tautwire.estimation.step_integration import Division, Integration, Step, integration_buffers
 
 Array = NDArray[np.float64]
 
@@ -62,13 +70,15 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFu
     slope = Function("slope", [moving, constants, number], [rates, by_constants])
     of_part = CompiledFunction(part).bind(count, buffers[0].T, buffers[2].T, buffers[3])
     of_slope = CompiledFunction(slope).bind(count, buffers[1].T, buffers[2].T, buffers[3])
+    division = Division(2, 1, 1, 0)
     integration = Integration(
         *(step(each) for each in (preparation, of_part, of_slope)),
-        Division(2, 1, 1, 0),
+        division,
         *buffers,
         np.ones(count),
         np.zeros((FROM, MOVING)),
         np.zeros((PARAMETERS, MOVING)),
+        integration_buffers(step(of_slope), division),
     )
     of_outputs = CompiledFunction(outputs).bind(count, state[:, None])
     of_process = CompiledFunction(process).bind(count, np.zeros((1, count)))
@@ -76,7 +86,7 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFu
 
 
 def step(function: BoundFunction) -> Step:
-    return Step(function.address, function.places, function.strides, function.results)
+    return Step(function.address, function.places.ctypes.data, function.strides.ctypes.data, function.results)
 
 
 def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
@@ -91,7 +101,8 @@ def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
     )
     outputs, integration, process, _owners = bound(COUNT, moments.state)
     samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
-    run_recursion(step(outputs), integration, step(process), moments, samples, record)
+    buffers = recursion_buffers(OUTPUTS, SIZE, PARAMETERS, integration.transition)
+    run_recursion(Functions(step(outputs), step(process)), integration, moments, samples, record, buffers)
     return moments, record
 
 

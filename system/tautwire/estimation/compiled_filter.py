@@ -15,7 +15,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
-from .covariance_recursion import Moments, Record, Samples, run_recursion
+from .covariance_recursion import Functions, Moments, Record, Samples, recursion_buffers, run_recursion
 from .integration_steps import Substeps
 from .kalman_filter import (
     Noise,
@@ -28,7 +28,7 @@ from .kalman_filter import (
     trajectory_function,
 )
 from .native_functions import BoundFunction, CompiledFunction
-from .step_integration import Division, Integration, Step
+from .step_integration import Division, Integration, Step, integration_buffers
 
 Array = NDArray[np.float64]
 
@@ -146,11 +146,12 @@ class CompiledFilter:
         process = self._process.bind(count, step, drift, density, inputs.disturbance)
         parameter_rows = start.sensitivities.shape[1]
         driving_count = preparation.results[2].shape[1]
+        slope_step, division = _step(slope), Division(*astuple(self._substeps))
         integration = Integration(
             _step(preparation),
             _step(part),
-            _step(slope),
-            Division(*astuple(self._substeps)),
+            slope_step,
+            division,
             moving,
             middle,
             constants,
@@ -158,6 +159,7 @@ class CompiledFilter:
             np.ascontiguousarray(step[0]),
             np.empty((self.model.states.numel() + driving_count, moving.shape[1])),
             np.empty((parameter_rows, moving.shape[1])),
+            integration_buffers(slope_step, division),
         )
         size, parameter_count = start.sensitivities.shape
         kept_count = count if keeps_covariances else 0
@@ -172,7 +174,8 @@ class CompiledFilter:
         )
         moments = Moments(state, covariance, sensitivities)
         samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
-        run_recursion(_step(outputs), integration, _step(process), moments, samples, record)
+        buffers = recursion_buffers(output_count, size, parameter_count, integration.transition)
+        run_recursion(Functions(_step(outputs), _step(process)), integration, moments, samples, record, buffers)
         return FilterResults(
             record.states.T,
             record.covariances,
@@ -216,4 +219,4 @@ def _settling_states(model: SymbolicModel, constant_count: int) -> tuple[NDArray
 
 
 def _step(function: BoundFunction) -> Step:
-    return Step(function.address, function.places, function.strides, function.results)
+    return Step(function.address, function.places.ctypes.data, function.strides.ctypes.data, function.results)

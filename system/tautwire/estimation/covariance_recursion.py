@@ -30,10 +30,22 @@ from .step_integration import (
     compiled,
     evaluate,
     integrate_step,
+    multiply,
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "581902eed04fb2d5ed6fbc9ffe928e9a2d044053ab95ce620d17e91cc38376fa"
+STEP_INTEGRATION_SHA256 = "08a8c84d58b1334e4500644f30359c31d5d6f9b4ab8c5ac6a5792fc860a50195"
+
+
+class Functions(NamedTuple):
+    """Functions of a sample and the state.
+
+    ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``process`` decay and process
+    noise (1, n).
+    """
+
+    outputs: Step
+    process: Step
 
 
 class Moments(NamedTuple):
@@ -69,32 +81,64 @@ class Record(NamedTuple):
     sensitivities: Any
 
 
+class Buffers(NamedTuple):
+    """Buffers of a run, written anew for each sample.
+
+    ``innovations`` (m,) and their ``slopes`` by parameters (p, m); their ``variances`` without white noise and the
+    ``whitening`` matrix (m, m); their ``cross_covariances`` with the state, and ``whitened`` ones (m, n); what is taken
+    from the ``covariance`` (n, n) and added to the ``sensitivities`` (p, n). Of a step that moves states by c others:
+    ``moved_rows`` (moving, n) of the covariance, their first columns (moving, c), and ``moved`` ones by both sides
+    (moving, moving); first columns (p, c) of the sensitivities, and ``moved_sensitivities`` (p, moving).
+    """
+
+    innovations: Any
+    slopes: Any
+    variances: Any
+    whitening: Any
+    cross_covariances: Any
+    whitened: Any
+    covariance: Any
+    sensitivities: Any
+    moved_rows: Any
+    moved_rows_from: Any
+    moved: Any
+    sensitivities_from: Any
+    moved_sensitivities: Any
+
+
+def recursion_buffers(output_count: int, size: int, parameter_count: int, transition: Any) -> Buffers:
+    """Buffers for a number of outputs, states and parameters, and the transition of an integration."""
+    m, n, p = output_count, size, parameter_count
+    from_count, moving = transition.shape
+    shapes: list[tuple[int, ...]] = [(m,), (p, m), (m, m), (m, m), (m, n), (m, n), (n, n), (p, n)]
+    shapes += [(moving, n), (moving, from_count), (moving, moving), (p, from_count), (p, moving)]
+    return Buffers(*(np.empty(shape) for shape in shapes))
+
+
 @compiled
 def run_recursion(
-    outputs: Step, integration: Integration, process: Step, moments: Moments, samples: Samples, record: Record
+    functions: Functions, integration: Integration, moments: Moments, samples: Samples, record: Record, buffers: Buffers
 ) -> None:
     """Run over the K samples; all arrays are in C order.
 
-    For the state, ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``process``
-    decay and process noise (1, n). The first states move as the integration has it; behind those that are constant,
-    the others only decay.
+    The first states move as the integration has it; behind those that are constant, the others only decay.
     """
-    output_places, process_places = np.empty_like(outputs.places), np.empty_like(process.places)
+    outputs, process = functions.outputs, functions.process
     for k in range(len(samples.measured)):
         assign(record.states[k], moments.state)
         if len(record.covariances):
             assign_matrix(record.covariances[k], moments.covariance)
-        evaluate(outputs, k, output_places)
+        evaluate(outputs, k)
         if len(record.output_matrices):
             assign_matrix(record.output_matrices[k], outputs.results[1].T)
-        _update_by_measurements(outputs.results, moments, samples, record, k)
+        _update_by_measurements(outputs.results, moments, samples, record, buffers, k)
         integrate_step(integration, moments.state, k)
-        evaluate(process, k, process_places)
+        evaluate(process, k)
         decay, process_noise = process.results[0][0], process.results[1][0]
         if len(record.transitions):
             _record_transition(integration.transition, decay, record.transitions[k])
-        _update_covariance_over_step(integration.transition, decay, process_noise, moments.covariance)
-        _update_sensitivities_over_step(integration, decay, moments.sensitivities)
+        _update_covariance_over_step(integration.transition, decay, process_noise, moments.covariance, buffers)
+        _update_sensitivities_over_step(integration, decay, moments.sensitivities, buffers)
         for i in range(len(decay)):
             moments.state[i] *= decay[i]
         assign(moments.state[: integration.moving.shape[1]], integration.moving[0])
@@ -103,19 +147,41 @@ def run_recursion(
 
 @compiled
 def _update_by_measurements(
-    results: tuple[Any, ...], moments: Moments, samples: Samples, record: Record, k: int
+    results: tuple[Any, ...], moments: Moments, samples: Samples, record: Record, buffers: Buffers, k: int
 ) -> None:
     """Update by the outputs of sample k.
 
     Gaussian elimination leaves of each output what those before it do not predict; the moments follow all at once.
     """
-    by_state, white_variances = results[1], samples.white_variances
-    innovations = samples.measured[k] - results[0][0]
-    slopes = -(results[2] + np.dot(moments.sensitivities, by_state))
-    cross_covariances = np.dot(by_state.T, moments.covariance)
-    variances = np.dot(cross_covariances, by_state)
-    for i in range(len(innovations)):
-        variance = variances[i, i] + white_variances[i]
+    by_state, cross_covariances, whitened = results[1], buffers.cross_covariances, buffers.whitened
+    multiply(moments.sensitivities, by_state, buffers.slopes)
+    for i in range(by_state.shape[1]):
+        buffers.innovations[i] = samples.measured[k, i] - results[0][0, i]
+        for parameter in range(len(buffers.slopes)):
+            buffers.slopes[parameter, i] = -(results[2][parameter, i] + buffers.slopes[parameter, i])
+    multiply(by_state.T, moments.covariance, cross_covariances)
+    multiply(cross_covariances, by_state, buffers.variances)
+    _whiten(samples, record, buffers, k)
+    multiply(buffers.whitening, cross_covariances, whitened)
+    for i in range(len(whitened)):
+        for r in range(len(moments.state)):
+            moments.state[r] += buffers.innovations[i] * whitened[i, r]
+    multiply(buffers.slopes, whitened, buffers.sensitivities)
+    add_to_matrix(moments.sensitivities, 1.0, buffers.sensitivities)
+    multiply(whitened.T, whitened, buffers.covariance)
+    add_to_matrix(moments.covariance, -1.0, buffers.covariance)
+
+
+@compiled
+def _whiten(samples: Samples, record: Record, buffers: Buffers, k: int) -> None:
+    """Whiten innovations and slopes, and record them; the ``whitening`` matrix has no row of what is not observed."""
+    innovations, slopes = buffers.innovations, buffers.slopes
+    variances, whitening = buffers.variances, buffers.whitening
+    for i in range(len(whitening)):
+        for c in range(len(whitening)):
+            whitening[i, c] = 1.0 if c == i else 0.0
+    for i in range(len(whitening)):
+        variance = variances[i, i] + samples.white_variances[i]
         deviation = np.sqrt(variance)
         innovations[i] /= deviation
         record.values[k, i], record.log_variances[k, i] = innovations[i], np.log(variance)
@@ -124,23 +190,18 @@ def _update_by_measurements(
             record.sensitivities[k, parameter, i] = slopes[parameter, i]
         if samples.observed[k, i] == 0.0:
             innovations[i] = 0.0
-            for c in range(cross_covariances.shape[1]):
-                cross_covariances[i, c] = 0.0
+            for c in range(i + 1):
+                whitening[i, c] = 0.0
             continue
-        for c in range(cross_covariances.shape[1]):
-            cross_covariances[i, c] /= deviation
-        for later in range(i + 1, len(innovations)):
+        for c in range(i + 1):
+            whitening[i, c] /= deviation
+        for later in range(i + 1, len(whitening)):
             factor = variances[later, i] / deviation
             innovations[later] -= factor * innovations[i]
-            _subtract_row(cross_covariances, later, factor, i)
+            _subtract_row(whitening, later, factor, i)
             _subtract_row(variances, later, factor / deviation, i)
             for parameter in range(len(slopes)):
                 slopes[parameter, later] -= factor * slopes[parameter, i]
-    corrections = np.dot(innovations, cross_covariances)
-    for r in range(len(corrections)):
-        moments.state[r] += corrections[r]
-    add_to_matrix(moments.sensitivities, 1.0, np.dot(slopes, cross_covariances))
-    add_to_matrix(moments.covariance, -1.0, np.dot(cross_covariances.T, cross_covariances))
 
 
 @compiled
@@ -159,28 +220,43 @@ def _record_transition(by_state: Any, decay: Any, transition: Any) -> None:
 
 
 @compiled
-def _update_covariance_over_step(transition: Any, decay: Any, process_noise: Any, covariance: Any) -> None:
+def _update_covariance_over_step(
+    transition: Any, decay: Any, process_noise: Any, covariance: Any, buffers: Buffers
+) -> None:
     from_count, moving_count = transition.shape
-    size = len(covariance)
+    size, moved_rows, moved = len(covariance), buffers.moved_rows, buffers.moved
     for r in range(moving_count):
         covariance[r, r] += process_noise[r]
-    propagated = np.dot(transition.T, covariance[:from_count])
-    moved = np.dot(np.ascontiguousarray(propagated[:, :from_count]), transition)
+    multiply(transition.T, covariance[:from_count], moved_rows)
+    assign_matrix(buffers.moved_rows_from, moved_rows)
+    multiply(buffers.moved_rows_from, transition, moved)
+    for r in range(_first_decaying(decay, moving_count), size):
+        for j in range(moving_count, size):
+            covariance[r, j] *= decay[r]
+        for j in range(moving_count, size):
+            covariance[j, r] *= decay[r]
     for r in range(moving_count, size):
-        for j in range(moving_count, size):
-            covariance[r, j] *= decay[r] * decay[j]
         covariance[r, r] += process_noise[r]
     for r in range(moving_count):
         for j in range(moving_count, size):
-            covariance[r, j] = covariance[j, r] = propagated[r, j] * decay[j]
+            covariance[r, j] = covariance[j, r] = moved_rows[r, j] * decay[j]
         for j in range(r, moving_count):
             covariance[r, j] = covariance[j, r] = moved[r, j]
 
 
 @compiled
-def _update_sensitivities_over_step(integration: Integration, decay: Any, sensitivities: Any) -> None:
-    from_count, moving_count = integration.transition.shape
-    moved = np.dot(np.ascontiguousarray(sensitivities[:, :from_count]), integration.transition)
+def _first_decaying(decay: Any, first: int) -> int:
+    """Index of the first state that decays, behind those that are constant."""
+    while first < len(decay) and decay[first] == 1.0:
+        first += 1
+    return first
+
+
+@compiled
+def _update_sensitivities_over_step(integration: Integration, decay: Any, sensitivities: Any, buffers: Buffers) -> None:
+    moving_count, moved = integration.transition.shape[1], buffers.moved_sensitivities
+    assign_matrix(buffers.sensitivities_from, sensitivities)
+    multiply(buffers.sensitivities_from, integration.transition, moved)
     for i in range(len(sensitivities)):
         for j in range(moving_count):
             sensitivities[i, j] = integration.direct[i, j] + moved[i, j]

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from ..recordings.recording import Recording
 from .disturbance import Disturbance
 from .likelihood import FilterSegment, Likelihood
-from .step_integration import compiled
+from .step_integration import compiled_with_arrays
 
 Array = NDArray[np.float64]
 
@@ -129,7 +129,7 @@ def _run_of(segment: FilterSegment) -> Run:
     return Run(states, results.covariances, results.transitions, results.output_matrices, values, observed, steps)
 
 
-@compiled
+@compiled_with_arrays
 def differentiate_recursion(run: Run, disturbance: DisturbanceStates, derivatives: Derivatives, by_number: Any) -> None:
     """Differentiate a run's recursion; fills in ``by_number`` (2, K, m, k), see :func:`disturbance_sensitivities`."""
     size, number_count = derivatives.state.shape
@@ -158,7 +158,7 @@ def differentiate_recursion(run: Run, disturbance: DisturbanceStates, derivative
         _add_processes(transition, updated, onward, run.steps[k], disturbance, derivatives)
 
 
-@compiled
+@compiled_with_arrays
 def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
     """``L^-1``, ``L^-1 C`` and ``L^-1 C P`` of sample k; an output that was not observed is noise of its own."""
     output = run.output_matrices[k].copy()
@@ -186,14 +186,14 @@ def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
     return whitening, output, gain
 
 
-@compiled
+@compiled_with_arrays
 def _scale_row(matrix: Any, row: int, factor: float) -> None:
     """Multiply a row; written as ``matrix[row] *= factor``, it takes Numba seconds to compile."""
     for c in range(matrix.shape[1]):
         matrix[row, c] *= factor
 
 
-@compiled
+@compiled_with_arrays
 def _differentiate_innovations(
     innovations: Any,
     whitening: Any,
@@ -219,7 +219,7 @@ def _differentiate_innovations(
             by_number[1, i, j] = by_covariance[i, j, i]
 
 
-@compiled
+@compiled_with_arrays
 def _subtract_gain(gain: Any, shared: Any, covariance: Any) -> None:
     """Turn ``P_j`` into ``P_j - G' S_j - S_j' G``, by ``shared`` S (m k, n)."""
     size, number_count = covariance.shape[:2]
@@ -231,7 +231,7 @@ def _subtract_gain(gain: Any, shared: Any, covariance: Any) -> None:
                 covariance[c, j, r] = covariance[r, j, c]
 
 
-@compiled
+@compiled_with_arrays
 def _move_covariances(transition: Any, moving_count: int, covariance: Any) -> None:
     """Turn symmetric ``P_j`` into ``T P_j T'``; only the first states mix."""
     size, number_count = covariance.shape[:2]
@@ -250,7 +250,7 @@ def _move_covariances(transition: Any, moving_count: int, covariance: Any) -> No
                 covariance[r, j, c] = both[r, j, c]
 
 
-@compiled
+@compiled_with_arrays
 def _add_white_noise(gain: Any, errors: Any, disturbance: DisturbanceStates, derivatives: Derivatives) -> None:
     """Add what white noise changes by the filter's ``gain`` (n, m), from ``errors`` (m) over their variances."""
     for i in range(len(errors)):
@@ -262,7 +262,7 @@ def _add_white_noise(gain: Any, errors: Any, disturbance: DisturbanceStates, der
                 derivatives.covariance[r, number, c] += scaled * gain[c, i]
 
 
-@compiled
+@compiled_with_arrays
 def _add_processes(
     transition: Any, state: Any, onward: Any, step: float, disturbance: DisturbanceStates, derivatives: Derivatives
 ) -> None:

@@ -35,7 +35,9 @@ from .native_functions import CompiledFunction
 
 Array = NDArray[np.float64]
 
-CHUNK_SAMPLES = 500
+# Samples of a segment: binding functions to one takes as long as 40 samples, and its covariances take memory.
+CHUNK_SAMPLES = 2_000
+CHUNK_SAMPLES_WITH_COVARIANCES = 500
 
 
 @dataclass(frozen=True)
@@ -264,9 +266,10 @@ class Likelihood:
         theta = self.arguments(parameters)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
-        for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
+        length = CHUNK_SAMPLES_WITH_COVARIANCES if keeps_covariances else CHUNK_SAMPLES
+        for begin in range(0, len(is_recorded), length):
             self.poll_interrupts()
-            chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
+            chunk = tuple(column[:, begin : begin + length] for column in columns)
             inputs = FilterInputs(
                 chunk,
                 theta[:, None],
@@ -275,7 +278,7 @@ class Likelihood:
                 acceleration_noise_density,
             )
             results = self._filter_functions.run(now, inputs, keeps_covariances)
-            yield FilterSegment(chunk, is_recorded[begin : begin + CHUNK_SAMPLES], results)
+            yield FilterSegment(chunk, is_recorded[begin : begin + length], results)
             now = results.end
 
     def arguments(self, parameters: Sequence[float] | Array) -> Array:

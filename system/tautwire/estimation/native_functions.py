@@ -73,16 +73,17 @@ INSTRUCTIONS = {
         "{v}c = select i1 {v}b, double 1.0, double {0}\n{v} = select i1 {v}a, double -1.0, double {v}c"
     ),
 }
-RUN_TEMPLATE = """define void @run(i64 %count, ptr %places, ptr %strides) {{
+RUN_TEMPLATE = """define void @run(i64 %first, i64 %count, ptr %places, ptr %strides) {{
 begin:
-%any = icmp ugt i64 %count, 0
+%last = add i64 %first, %count
+%any = icmp ult i64 %first, %last
 br i1 %any, label %each, label %end
 each:
-%k = phi i64 [0, %begin], [%next, %each]
+%k = phi i64 [%first, %begin], [%next, %each]
 {places}
 {calls}
 %next = add i64 %k, 1
-%more = icmp ult i64 %next, %count
+%more = icmp ult i64 %next, %last
 br i1 %more, label %each, label %end
 end:
 ret void
@@ -104,7 +105,7 @@ class UntranslatableError(TautwireError):
 
 
 def llvm_assembly(function: Function) -> tuple[str, list[float]]:
-    """LLVM assembly that defines ``run(count, places, strides)``: the function, ``count`` times; and its constants.
+    """LLVM assembly that defines ``run(first, count, places, strides)``: the function, ``count`` times; and constants.
 
     ``places`` has a pointer to the first number of each argument, then of each result, to the constants, and to room
     for ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
@@ -178,7 +179,7 @@ def _operation(function: Function, operation: int, name: str, sources: list[str]
 
 Array = NDArray[np.float64]
 
-RUN_PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
+RUN_PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
 # Instructions beyond which CasADi's interpreter is faster.
 MAX_COMPILED_INSTRUCTIONS = 800_000
 
@@ -252,7 +253,8 @@ class CompiledFunction:
             workspace.ctypes.data,
         ]
         strides = [*self._argument_strides(sources), *result_sizes, 0, 0]
-        self._native_run(count, (ctypes.c_void_p * len(pointers))(*pointers), (ctypes.c_int64 * len(strides))(*strides))
+        places = (ctypes.c_void_p * len(pointers))(*pointers)
+        self._native_run(0, count, places, (ctypes.c_int64 * len(strides))(*strides))
         return results
 
     def bind(self, count: int, *arguments: Array) -> BoundFunction:

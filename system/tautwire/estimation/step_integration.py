@@ -7,8 +7,10 @@ larger part of length h, to some order,
     Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
 
 Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the series
-would blow up. Loops in machine code take a fraction of the time of the same operations written out one by one, which
-outgrow the processor's caches.
+would blow up. All of these are computed transposed, as the Jacobians are stored.
+
+Loops in machine code take a fraction of the time of the same operations written out one by one, which outgrow the
+processor's caches. They write into buffers that one run makes once.
 """
 
 from __future__ import annotations
@@ -24,40 +26,53 @@ from numba.extending import intrinsic
 AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
 
 
-def _type_call(_: Any, address: Any, places: Any, strides: Any) -> Any:
-    """Calls ``run(1, places, strides)`` of a compiled function at its address."""
+def _type_call(_: Any, address: Any, first: Any, places: Any, strides: Any) -> Any:
+    """Calls ``run(first, 1, places, strides)`` of a compiled function at its address."""
 
     def generate(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        address, first_sample, pointers, stride_pointer = arguments
         word = ir.IntType(64)
-        run_type = ir.FunctionType(ir.VoidType(), [word, word, word])
-        run = builder.inttoptr(arguments[0], run_type.as_pointer())
-        builder.call(run, [word(1), *arguments[1:]])
+        run = builder.inttoptr(address, ir.FunctionType(ir.VoidType(), [word] * 4).as_pointer())
+        builder.call(run, [first_sample, word(1), pointers, stride_pointer])
         return context.get_dummy_value()
 
-    return types.void(types.int64, types.int64, types.int64), generate
+    return types.void(*[types.int64] * 4), generate
 
 
 _call: Any = intrinsic(_type_call)
 
 
 def compiled(function: AnyFunction) -> AnyFunction:
-    """The function compiled at its first call; kept on disk where there is a folder that can be written."""
+    """The function compiled at its first call; kept on disk where there is a folder that can be written.
+
+    It may make no arrays: to count references to arrays would take a seventh of a filter's time.
+    """
+    return _compiled(function, _nrt=False)
+
+
+def compiled_with_arrays(function: AnyFunction) -> AnyFunction:
+    """As :func:`compiled`, of a function that makes arrays, or calls one of NumPy's that may."""
+    return _compiled(function, _nrt=True)
+
+
+def _compiled(function: AnyFunction, **options: Any) -> AnyFunction:
+    options |= {"nogil": True, "error_model": "numpy"}
     try:
-        machine_code: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
+        machine_code: Any = njit(cache=True, **options)(function)
     except RuntimeError:
-        machine_code = njit(nogil=True, error_model="numpy")(function)
+        machine_code = njit(**options)(function)
     return cast(AnyFunction, machine_code)
 
 
 class Step(NamedTuple):
     """Compiled function of a sample, as :class:`tautwire.estimation.native_functions.BoundFunction` has it.
 
-    That one has to live as long as this.
+    That one has to live as long as this. ``places`` and ``strides`` are addresses of its arrays.
     """
 
     address: int
-    places: Any
-    strides: Any
+    places: int
+    strides: int
     results: tuple[Any, ...]
 
 
@@ -68,6 +83,24 @@ class Division(NamedTuple):
     slope: int
     order: int
     doublings: int
+
+
+class IntegrationBuffers(NamedTuple):
+    """Buffers of an integration: states in the middle of its larger parts (parts, n), and derivatives, all transposed.
+
+    ``over_part`` and ``by_state`` (n, n) are by the state over a part and over all, ``gamma`` (n, n) is the integrated
+    exponential, ``by_constants`` (q, n) over all; ``square`` and ``longer`` (n, n) and ``rows`` (q, n) hold what comes
+    next of each.
+    """
+
+    middles: Any
+    over_part: Any
+    by_state: Any
+    gamma: Any
+    square: Any
+    longer: Any
+    by_constants: Any
+    rows: Any
 
 
 class Integration(NamedTuple):
@@ -93,6 +126,14 @@ class Integration(NamedTuple):
     steps: Any
     transition: Any
     direct: Any
+    buffers: IntegrationBuffers
+
+
+def integration_buffers(slope: Step, division: Division) -> IntegrationBuffers:
+    """Buffers for the Jacobians that ``slope`` gives."""
+    jacobian, by_constants = slope.results
+    shapes = [(division.slope, len(jacobian)), *[jacobian.shape] * 5, *[by_constants.shape] * 2]
+    return IntegrationBuffers(*(np.empty(shape) for shape in shapes))
 
 
 @compiled
@@ -118,90 +159,101 @@ def add_to_matrix(target: Any, factor: float, values: Any) -> None:
             target[i, j] += factor * values[i, j]
 
 
+@compiled_with_arrays
+def multiply(left: Any, right: Any, product: Any) -> None:
+    """Set the product of two matrices."""
+    np.dot(left, right, product)
+
+
 @compiled
-def evaluate(step: Step, k: int, places: Any) -> None:
-    """Evaluate at sample k; ``places`` belong to the caller, so that they live as long as the call."""
-    assign(places, step.places + 8 * k * step.strides)
-    _call(step.address, places.ctypes.data, step.strides.ctypes.data)
+def evaluate(step: Step, k: int) -> None:
+    """Evaluate at sample k."""
+    _call(step.address, k, step.places, step.strides)
 
 
 @compiled
 def integrate_step(integration: Integration, state: Any, k: int) -> None:
     """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones."""
-    evaluate(integration.preparation, k, np.empty_like(integration.preparation.places))
+    evaluate(integration.preparation, k)
     assign_matrix(integration.constants, integration.preparation.results[0])
-    middles = _move(integration, state, k)
-    _differentiate(integration, middles, k)
+    _move(integration, state, k)
+    _differentiate(integration, k)
+    _fill_in(integration)
 
 
 @compiled
-def _move(integration: Integration, state: Any, k: int) -> Any:
-    """Move the moving states to the end of the step; returns them in the middle of each larger part, (parts, n)."""
-    moving, parts, middle_count = integration.moving[0], integration.division.state, integration.division.slope
-    middles, places = np.empty((middle_count, len(moving))), np.empty_like(integration.part.places)
+def _move(integration: Integration, state: Any, k: int) -> None:
+    """Move the moving states to the end of the step, and record them in the middle of each larger part."""
+    moving, parts, middles = integration.moving[0], integration.division.state, integration.buffers.middles
     assign(moving, state)
     for part in range(parts):
         integration.index[0, 0] = part
-        evaluate(integration.part, k, places)
+        evaluate(integration.part, k)
         reached = integration.part.results[0][0]
-        for j in range(middle_count):
-            at = (j + 0.5) / middle_count * parts
+        for j in range(len(middles)):
+            at = (j + 0.5) / len(middles) * parts
             if min(int(at), parts - 1) == part:
                 for r in range(len(moving)):
                     middles[j, r] = moving[r] + (at - part) * (reached[r] - moving[r])
         assign(moving, reached)
-    return middles
 
 
 @compiled
-def _differentiate(integration: Integration, middles: Any, k: int) -> None:
+def _differentiate(integration: Integration, k: int) -> None:
     """Derivatives of the end of the step, from the Jacobians in the middle of each larger part."""
-    division, size, count = integration.division, middles.shape[1], len(integration.slope.results[1])
+    division, buffers = integration.division, integration.buffers
     part = integration.steps[k] / division.slope
-    transition, by_constants, over_part = np.empty((size, size)), np.empty((count, size)), np.empty((size, size))
-    places = np.empty_like(integration.slope.places)
     for j in range(division.slope):
         integration.index[0, 0] = j
-        assign(integration.middle[0], middles[j])
-        evaluate(integration.slope, k, places)
+        assign(integration.middle[0], buffers.middles[j])
+        evaluate(integration.slope, k)
         jacobian, slopes = integration.slope.results
-        gamma = _integrated_exponential(jacobian, part, division)
-        _set_identity_plus(jacobian, 1.0, gamma, over_part)
+        _integrate_exponential(jacobian, part, division, buffers)
+        _set_identity_plus(jacobian, buffers.gamma, buffers.over_part)
         if j == 0:
-            assign_matrix(transition, over_part)
-            assign_matrix(by_constants, np.dot(slopes, gamma.T))
-        else:
-            transition = np.dot(over_part, transition)
-            by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
-    _fill_in(integration, transition, by_constants)
+            assign_matrix(buffers.by_state, buffers.over_part)
+            multiply(slopes, buffers.gamma, buffers.by_constants)
+            continue
+        multiply(buffers.by_state, buffers.over_part, buffers.square)
+        assign_matrix(buffers.by_state, buffers.square)
+        multiply(buffers.by_constants, buffers.over_part, buffers.rows)
+        multiply(slopes, buffers.gamma, buffers.by_constants)
+        add_to_matrix(buffers.by_constants, 1.0, buffers.rows)
 
 
 @compiled
-def _integrated_exponential(jacobian: Any, part: float, division: Division) -> Any:
-    """Integral of the matrix exponential over a part: what a constant rate adds to the state."""
-    step = part / 2**division.doublings
-    series, longer = np.eye(len(jacobian)), np.empty_like(jacobian)
+def _integrate_exponential(jacobian: Any, part: float, division: Division, buffers: IntegrationBuffers) -> None:
+    """Set ``gamma``, the integral of the matrix exponential over a part: what a constant rate adds to the state."""
+    step, gamma, longer = part / 2**division.doublings, buffers.gamma, buffers.longer
+    for r in range(len(gamma)):
+        for c in range(len(gamma)):
+            gamma[r, c] = step if r == c else 0.0
     for term in range(division.order, 1, -1):
-        _set_identity_plus(jacobian, step / term, series, longer)
-        series, longer = longer, series
-    gamma = step * series
+        multiply(jacobian, gamma, longer)
+        for r in range(len(gamma)):
+            for c in range(len(gamma)):
+                gamma[r, c] = step / term * longer[r, c]
+            gamma[r, r] += step
     for _ in range(division.doublings):
-        _set_identity_plus(jacobian, 1.0, gamma, longer)
-        gamma = gamma + np.dot(longer, gamma)
-    return gamma
+        _set_identity_plus(jacobian, gamma, longer)
+        multiply(longer, gamma, buffers.square)
+        add_to_matrix(gamma, 1.0, buffers.square)
 
 
 @compiled
-def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> None:
+def _fill_in(integration: Integration) -> None:
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
     by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
-    theta_count, size, driving = len(by_theta), len(transition), len(factors)
+    by_state, by_constants = integration.buffers.by_state, integration.buffers.by_constants
+    theta_count, size, driving = len(by_theta), len(by_state), len(factors)
     if by_theta.shape[1] > 0:
-        add_to_matrix(by_constants[:theta_count], 1.0, np.dot(by_theta, by_constants[theta_count:]))
+        rows = integration.buffers.rows[:theta_count]
+        multiply(by_theta, by_constants[theta_count:], rows)
+        add_to_matrix(by_constants[:theta_count], 1.0, rows)
     result = integration.transition
     constant_count = len(result) - size - driving
     first_constant = theta_count - constant_count
-    assign_matrix(result[:size], transition.T)
+    assign_matrix(result[:size], by_state)
     assign_matrix(result[size : size + constant_count], by_constants[first_constant:theta_count])
     for i in range(driving):
         for j in range(size):
@@ -210,13 +262,8 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
 
 
 @compiled
-def _set_identity_plus(jacobian: Any, factor: float, matrix: Any, result: Any) -> None:
-    """Set ``I + factor F M`` of a Jacobian ``F``, which is stored by columns and mostly zeros, and a matrix ``M``."""
-    result[:] = 0.0
-    for r in range(len(jacobian)):
-        result[r, r] = 1.0
-        for c in range(len(jacobian)):
-            slope = factor * jacobian[c, r]
-            if slope != 0.0:
-                for j in range(matrix.shape[1]):
-                    result[r, j] += slope * matrix[c, j]
+def _set_identity_plus(left: Any, right: Any, matrix: Any) -> None:
+    """Set the identity plus a product of two square matrices."""
+    multiply(left, right, matrix)
+    for r in range(len(matrix)):
+        matrix[r, r] += 1.0
