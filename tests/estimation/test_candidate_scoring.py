@@ -19,7 +19,6 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.score_test import PredictedGain
-from tautwire.estimation.time_limit import TimeLimit
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -57,23 +56,14 @@ def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_
     noise = estimate_noise(robot, recording)
     split = split_data(robot, noise, recording, None)
     scores: dict[Hypothesis, CandidateScore] = {}
-    limit = TimeLimit(600.0, lambda: 601.0 * bool(scores))
-
-    def log_likelihood(robot: Robot, *_: object) -> float:
-        limit.check()
-        return float(robot.effects[0].name == best_on_fit)
-
     refitted: list[Hypothesis] = []
-    fitter: Any = SimpleNamespace(log_likelihood=log_likelihood, has_disturbance=True)
-    context = IdentificationContext(robot, fitter, split, time_limit=limit)
+    context = IdentificationContext(robot, Fitter(noise), split)
     for name, nats in evidence.items():
         hypothesis = Hypothesis(BY_NAME[name], (1, 2, 3) if name == "relaxation" else ())
         fit = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
-        scores[hypothesis] = CandidateScore(hypothesis, fit, nats, 1.0)
+        scores[hypothesis] = CandidateScore(hypothesis, fit, nats, 1.0, explained=float(name == best_on_fit))
     monkeypatch.setattr(candidate_scoring, "fit_candidates", lambda _, __, tasks, *___: refitted.extend(tasks) or {})
-    # Time is up once there are scores, which must not be lost by that.
-    with limit.searching(0.6):
-        candidate_scoring._refitted_beside_own_disturbance(context, "round 1", (), scores, 0.0)
+    candidate_scoring._refitted_beside_own_disturbance(context, "round 1", (), scores, 0.0)
     assert [each.effect.name for each in refitted] == ([best_on_fit, *(set(evidence) - {best_on_fit})] * is_refitted)
 
 

@@ -62,8 +62,10 @@ def _with_values_of(
     gain = fitter.log_likelihood(fit.robot, chosen, split.estimation) - shared_likelihood
     if gain <= price:
         return context, selection
-    unseen_gain = marginal_log_likelihood(fitter, fit.robot, chosen, split.validation, is_coarse=False)
-    unseen_gain -= marginal_log_likelihood(context.fitter, robot, accepted, split.validation, is_coarse=False)
+    models = [(context.fitter, robot, accepted), (fitter, fit.robot, chosen)]
+    calls = [(*model, split.validation, False) for model in models]
+    unseen = dict(context.workers.map_unordered(marginal_log_likelihood, calls))
+    unseen_gain = unseen[1] - unseen[0]
     left_by_form = context.policy.selection.min_cable_evidence_ratio * evidence[shared]
     if gain + unseen_gain <= left_by_form:
         return context, selection

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import reduce
-from math import inf
+from math import inf, nan
 
 import numpy as np
 
@@ -24,17 +24,22 @@ from .time_limit import OutOfTimeError
 
 @dataclass(frozen=True)
 class ValidatedFit:
-    """A fit with its validation: log-likelihood and mean square of the innovations on validation data."""
+    """A fit with its validation: log-likelihood and mean square of the innovations on validation data.
+
+    ``explained`` is the log-likelihood of the estimation data under the fitter's own disturbance, NaN without one.
+    """
 
     fit: Fit
     log_likelihood: float
     mean_square: float
+    explained: float
 
 
 def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
     """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
     try:
         fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
+        explained = fitter.log_likelihood(fit.robot, task.chosen, data) if fitter.has_disturbance else nan
         for _ in range(task.disturbance_refits):
             fitter = with_fitted_disturbance(fitter, fit.robot, task.chosen, data)
             fit = fitter.fit_from([fit.robot], task.chosen, data, -inf, task.cost_tolerance)
@@ -48,7 +53,7 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
     except (UnreachableError, NoFitError, np.linalg.LinAlgError):
         return None
     mean_square = innovations.overall_mean_square(validation.rows)
-    return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
+    return ValidatedFit(fit, log_likelihood, mean_square, explained) if np.isfinite(log_likelihood) else None
 
 
 def fit_candidates(
@@ -76,7 +81,8 @@ def fit_candidates(
                 if validated is None:
                     continue
                 gain = validated.log_likelihood - baseline
-                scores[hypothesis] = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square)
+                score = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square, validated.explained)
+                scores[hypothesis] = score
                 if stop_at_first and leaves_noise(context, scores[hypothesis]):
                     break
     except OutOfTimeError:

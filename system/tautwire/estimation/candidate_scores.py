@@ -23,13 +23,15 @@ class CandidateScore:
     """Score of a candidate: a hypothesis fitted beside the accepted ones.
 
     ``evidence`` is its log-likelihood on validation data over that of the model without it at its best there,
-    ``mean_square`` that of the innovations there.
+    ``mean_square`` that of the innovations there. ``explained`` is the log-likelihood of the estimation data under the
+    round's disturbance, NaN without one.
     """
 
     hypothesis: Hypothesis
     fit: Fit
     evidence: float
     mean_square: float
+    explained: float = math.nan
 
     @property
     def parameter_count(self) -> int:

@@ -108,16 +108,12 @@ def _refitted_beside_own_disturbance(
     of a model without it, which had to be large, an effect that explains nearly all may be fitted badly.
     """
     estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
-    models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
-    # The fits are there: time that is up must not lose them.
-    with context.time_limit.suspended():
-        explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
-    ranked = sorted(scores, key=lambda h: -explained[h])
+    ranked = sorted(scores, key=lambda h: -scores[h].explained)
     best = most_parsimonious(list(scores.values()), context.policy.selection, has_disturbance=True)
     if best is None or (best.hypothesis == ranked[0] and best.evidence >= context.evidence_threshold()):
         return {}
     tasks = {
-        h: FitTask(models[h], (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
+        h: FitTask(tuple(with_hypothesis(accepted, h)), (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
         for h in ranked[: context.policy.selection.always_refitted]
     }
     refits = fit_candidates(context, f"{label}, own disturbance", tasks, estimation, baseline)

@@ -185,9 +185,8 @@ def _alternated(posterior: Posterior, current: Evaluation, policy: DisturbancePo
     """Evaluation at the disturbance that is most probable given the uncertain parameters as they are."""
     conditional = posterior.given_constants(current.constants)
     coarse = replace(policy, min_gain=policy.min_coarse_gain)
-    return posterior.evaluation(
-        ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
-    )
+    start = conditional.evaluation(current.logs, is_scored=True)
+    return posterior.evaluation(ascended(conditional, start, coarse, policy.max_iterations).logs)
 
 
 def _fresh_starts(prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Array]:

@@ -28,13 +28,15 @@ from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_sensitivities import disturbance_sensitivities
 from .estimation_data import DataSet
 from .kalman_filter import Noise
-from .likelihood import Likelihood
+from .likelihood import FilterSegment, Likelihood
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import DisturbancePolicy
 
 Array = NDArray[np.float64]
 
 CONCURRENT_EVALUATIONS = 2
+# Numbers in the covariances of a filter's run up to which an evaluation keeps it: 64 MB with the transitions.
+MAX_KEPT_COVARIANCES = 4_000_000
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ class Evaluation:
 
     These count N of the outputs (samples, m), where ``is_counted``. ``slopes_by_parameters`` (p, N) are those of the
     innovations by the units of free parameters; ``constants`` (c) the uncertain parameters there, in standard
-    deviations.
+    deviations. ``segments`` of the filter's run, if it is to be scored, are there unless they take much memory.
     """
 
     coordinates: Array
@@ -131,6 +133,7 @@ class Evaluation:
     slopes_by_parameters: Array
     constants: Array
     is_counted: NDArray[np.bool_]
+    segments: tuple[FilterSegment, ...]
 
     @property
     def logs(self) -> Array:
@@ -169,6 +172,11 @@ class Posterior:
         low, high = (np.append(bound, own) for bound, own in zip((lower, upper), of_parameters, strict=True))
         return low, high
 
+    @cached_property
+    def _keeps_segments(self) -> bool:
+        _, covariance = self.likelihood.start(self.values)
+        return self.data.recording.sample_count * covariance.size <= MAX_KEPT_COVARIANCES
+
     def values_at(self, coordinates: Array) -> Array:
         """The parameters (p,) at some coordinates."""
         if not len(self.box.units):
@@ -176,18 +184,21 @@ class Posterior:
         moved = self.values + self.box.units * coordinates[self.prior.number_count :]
         return np.clip(moved, self.box.lower, self.box.upper)
 
-    def evaluation(self, coordinates: Array) -> Evaluation:
-        """Its evaluation at some coordinates, or at the bounds that these exceed."""
+    def evaluation(self, coordinates: Array, is_scored: bool = False) -> Evaluation:
+        """Its evaluation at some coordinates, or at the bounds that these exceed; its score may be asked for next."""
         coordinates = np.clip(coordinates, *self.bounds)
         logs = coordinates[: self.prior.number_count]
         likelihood = self.likelihood.with_disturbance(self.prior.disturbance_of(logs))
-        innovations = likelihood.innovations(self.data.recording, self.values_at(coordinates))
+        innovations = likelihood.innovations(
+            self.data.recording, self.values_at(coordinates), keeps_segments=is_scored and self._keeps_segments
+        )
         mask = innovations.observed & self.data.rows[:, None]
         value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
         value = value if np.isfinite(value) else -np.inf
         values, log_variances = innovations.values[mask], innovations.log_variances[mask]
         slopes = innovations.sensitivities[mask].T[: len(self.box.units)] * self.box.units[:, None]
-        return Evaluation(coordinates, value, values, log_variances, slopes, innovations.constants, mask)
+        constants, segments = innovations.constants, innovations.segments
+        return Evaluation(coordinates, value, values, log_variances, slopes, constants, mask, segments)
 
     def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
         """Evaluations at several coordinates, two at once: a compiled filter runs without Python's lock."""
@@ -197,7 +208,8 @@ class Posterior:
     def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
         """Gradient and Fisher information by the coordinates."""
         disturbance, values = self.prior.disturbance_of(evaluation.logs), self.values_at(evaluation.coordinates)
-        by_logs = disturbance_sensitivities(self.likelihood, disturbance, self.data.recording, values)
+        recording, segments = self.data.recording, evaluation.segments
+        by_logs = disturbance_sensitivities(self.likelihood, disturbance, recording, values, segments)
         slopes, log_slopes = (derivatives[evaluation.is_counted].T for derivatives in by_logs)
         slopes = np.vstack([slopes, evaluation.slopes_by_parameters])
         log_slopes = np.vstack([log_slopes, np.zeros_like(evaluation.slopes_by_parameters)])
@@ -226,7 +238,7 @@ def ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy,
         while damping < policy.max_damping:
             scaled = information + damping * np.diag(np.diag(information))
             step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
-            trial = posterior.evaluation(current.coordinates + step)
+            trial = posterior.evaluation(current.coordinates + step, is_scored=True)
             if trial.value > current.value:
                 break
             damping *= 10.0

@@ -22,7 +22,7 @@ and Smoothing, sec. 12.3 and appendix A.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -73,14 +73,18 @@ class Derivatives(NamedTuple):
 
 
 def disturbance_sensitivities(
-    likelihood: Likelihood, disturbance: Disturbance, recording: Recording, parameters: Sequence[float] | Array
+    likelihood: Likelihood,
+    disturbance: Disturbance,
+    recording: Recording,
+    parameters: Sequence[float] | Array,
+    segments: Iterable[FilterSegment] = (),
 ) -> tuple[Array, Array]:
     """Derivatives of whitened innovations and of the logs of their variances by the logs of a disturbance's numbers.
 
     Both (N, m, k), of the N samples of a recording; where nothing was observed they mean nothing. The k numbers are rms
     and bandwidth of each process, then the white noise of each kind of sensor. The likelihood has to have a
     disturbance. The linearisation is held: where states move with the numbers, differences of whole runs are not quite
-    these.
+    these. ``segments`` are those of the filter's run where they are known; else it runs.
 
     Source: see the module.
     """
@@ -90,7 +94,7 @@ def disturbance_sensitivities(
     derivatives = _derivatives_at_start(states)
     number_count = derivatives.state.shape[1]
     parts = []
-    for segment in likelihood.segments(recording, parameters):
+    for segment in segments or likelihood.segments(recording, parameters):
         run = _run_of(segment)
         by_number = np.empty((2, *run.values.shape, number_count))
         differentiate_recursion(run, states, derivatives, by_number)

@@ -46,7 +46,8 @@ class Innovations:
 
     ``values`` (N, m) have unit variance where the model is right; ``sensitivities`` (N, m, p) are their derivatives by
     the free parameters; ``log_variances`` (N, m) the log of the variances that they were divided by. ``constants`` (c)
-    are the uncertain parameters as filtered, in declared standard deviations.
+    are the uncertain parameters as filtered, in declared standard deviations. ``segments`` are those of the filter's
+    run where they were to be kept.
     """
 
     observed: NDArray[np.bool_]
@@ -54,6 +55,7 @@ class Innovations:
     sensitivities: Array
     log_variances: Array
     constants: Array = field(default_factory=lambda: np.zeros(0))
+    segments: tuple[FilterSegment, ...] = ()
 
     def log_likelihood(self, rows: NDArray[np.bool_]) -> float:
         """Log of the probability density, in SI units, of the samples in ``rows`` given those before them."""
@@ -123,27 +125,34 @@ class Likelihood:
         return self.model.states.numel() - len(self.uncertain)
 
     def innovations(
-        self, recording: Recording, parameters: Sequence[float] | Array, acceleration_noise_density: float = 0.0
+        self,
+        recording: Recording,
+        parameters: Sequence[float] | Array,
+        acceleration_noise_density: float = 0.0,
+        keeps_segments: bool = False,
     ) -> Innovations:
         """Filter a recording at some values of the free parameters.
 
         ``acceleration_noise_density`` (m/s^2 per root hertz) adds process noise, an unknown white acceleration of the
-        platform: a fit that starts far from the solution then follows the data instead of losing phase.
+        platform: a fit that starts far from the solution then follows the data instead of losing phase. The segments
+        are kept with their covariances, which takes memory in proportion to the recording's length.
         """
         self._require_small_rotations(recording)
         measured, shift = self._aligned_outputs(recording, parameters)
         observed = np.isfinite(measured)
-        filter_segments = self._filter(
-            recording, (measured, shift), parameters, self._start_covariance(parameters), acceleration_noise_density
+        covariance = self._start_covariance(parameters)
+        filter_segments: Iterable[FilterSegment] = self._filter(
+            recording, (measured, shift), parameters, covariance, acceleration_noise_density, keeps_segments
         )
-        values, log_variances, sensitivities, last_state = _concatenated(filter_segments)
+        kept = tuple(filter_segments) if keeps_segments else ()
+        values, log_variances, sensitivities, last_state = _concatenated(kept or filter_segments)
         recorded = np.isfinite(self._measured(recording))
         values[~recorded] = np.nan
         log_variances[~recorded] = np.nan
         _fill_unaligned(values, log_variances, sensitivities, recorded & ~observed)
         size = self.model.states.numel()
         constants = last_state[size - len(self.uncertain) : size]
-        return Innovations(recorded, values, sensitivities, log_variances, constants)
+        return Innovations(recorded, values, sensitivities, log_variances, constants, kept)
 
     @property
     def instruction_count(self) -> int:
