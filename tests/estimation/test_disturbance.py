@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation import disturbance_fit
+from tautwire.estimation import disturbance_fit, disturbance_posterior
 from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.candidate_fits import fit_and_validate, maximised_validation_likelihood
 from tautwire.estimation.candidate_proposals import FitTask
@@ -218,6 +218,21 @@ def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None
     expected = [(later - earlier) / (2.0 * width) for later, earlier in values]
     assert gradient == pytest.approx(expected, rel=1e-3, abs=1e-3)
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
+
+
+def test_a_score_takes_the_filter_run_of_its_evaluation_unless_that_was_too_large(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    data, likelihood = data_of(PAIR[0].first(200)), likelihood_of(disturbed(force=5.0, position=2e-4, tension=3.0))
+    posterior = Posterior(likelihood, np.zeros(0), data, disturbance_prior(ROBOT, NOISE))
+    logs = logs_of(posterior.prior.median)
+    kept, dropped = (posterior.evaluation(logs, is_scored) for is_scored in (True, False))
+    assert len(kept.segments) == 1
+    assert dropped.segments == ()
+    for with_run, without_run in zip(posterior.score(kept), posterior.score(dropped), strict=True):
+        np.testing.assert_array_equal(with_run, without_run)
+    monkeypatch.setattr(disturbance_posterior, "MAX_KEPT_COVARIANCES", 200 * len(likelihood.start(())[0]) ** 2 - 1)
+    assert replace(posterior).evaluation(logs, is_scored=True).segments == ()
 
 
 def test_the_score_by_a_free_parameter_is_its_derivative_but_for_the_gains() -> None:

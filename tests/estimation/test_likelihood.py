@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.integration_steps import Substeps
@@ -22,6 +23,7 @@ ROBOT = example("three")
 RECORDING = recorded("three", 1)
 NOISE = estimate_noise(ROBOT, RECORDING)
 ALL = np.ones(len(RECORDING.time), dtype=bool)
+MASS = FreeParameter(0, "mass")
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
@@ -160,6 +162,21 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
         step[place] = width
         difference = (run(state + step).end.state - run(state - step).end.state) / (2.0 * width)
         assert np.max(np.abs(difference - transition[:, place])) < within * np.max(np.abs(difference))
+
+
+def test_segments_follow_one_another_as_one_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    noise = replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median)
+    filtered = Likelihood(ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0})), (MASS,), noise, 0.02)
+    in_one = filtered.innovations(RECORDING, [1.0])
+    monkeypatch.setattr(likelihoods, "SEGMENT_SAMPLES", 350)
+    in_parts = filtered.innovations(RECORDING, [1.0])
+    kept = filtered.innovations(RECORDING, [1.0], keeps_segments=True)
+    assert in_one.segments == in_parts.segments == ()
+    assert [len(segment.results.covariances) for segment in kept.segments] == [500, 301]
+    for innovations in (in_parts, kept):
+        np.testing.assert_array_equal(innovations.values, in_one.values)
+        np.testing.assert_array_equal(innovations.log_variances, in_one.log_variances)
+        np.testing.assert_array_equal(innovations.sensitivities, in_one.sensitivities)
 
 
 def test_a_run_can_be_ended_at_each_of_its_segments() -> None:

@@ -36,8 +36,8 @@ from .native_functions import CompiledFunction
 Array = NDArray[np.float64]
 
 # Samples of a segment: binding functions to one takes as long as 40 samples, and its covariances take memory.
-CHUNK_SAMPLES = 2_000
-CHUNK_SAMPLES_WITH_COVARIANCES = 500
+SEGMENT_SAMPLES = 2_000
+SEGMENT_SAMPLES_WITH_COVARIANCES = 500
 
 
 @dataclass(frozen=True)
@@ -275,7 +275,7 @@ class Likelihood:
         theta = self.arguments(parameters)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
-        length = CHUNK_SAMPLES_WITH_COVARIANCES if keeps_covariances else CHUNK_SAMPLES
+        length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
         for begin in range(0, len(is_recorded), length):
             self.poll_interrupts()
             chunk = tuple(column[:, begin : begin + length] for column in columns)
