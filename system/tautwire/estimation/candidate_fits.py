@@ -83,7 +83,7 @@ def fit_candidates(
                 gain = validated.log_likelihood - baseline
                 score = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square, validated.explained)
                 scores[hypothesis] = score
-                if stop_at_first and leaves_noise(context, scores[hypothesis]):
+                if stop_at_first and leaves_noise(context, score):
                     break
     except OutOfTimeError:
         names = ", ".join(hypothesis.label(context.robot) for hypothesis in remaining)

@@ -34,7 +34,7 @@ from .step_integration import (
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "08a8c84d58b1334e4500644f30359c31d5d6f9b4ab8c5ac6a5792fc860a50195"
+STEP_INTEGRATION_SHA256 = "fe08060e2df717d6401b43457340386553542f64a3bd144ad1fc24c9a173a1a6"
 
 
 class Functions(NamedTuple):
@@ -233,7 +233,6 @@ def _update_covariance_over_step(
     for r in range(_first_decaying(decay, moving_count), size):
         for j in range(moving_count, size):
             covariance[r, j] *= decay[r]
-        for j in range(moving_count, size):
             covariance[j, r] *= decay[r]
     for r in range(moving_count, size):
         covariance[r, r] += process_noise[r]

@@ -278,16 +278,16 @@ class Likelihood:
         length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
         for begin in range(0, len(is_recorded), length):
             self.poll_interrupts()
-            chunk = tuple(column[:, begin : begin + length] for column in columns)
+            of_segment = tuple(column[:, begin : begin + length] for column in columns)
             inputs = FilterInputs(
-                chunk,
+                of_segment,
                 theta[:, None],
                 self.disturbance_arguments,
                 self.noise.white_variances(self.cable_count),
                 acceleration_noise_density,
             )
             results = self._filter_functions.run(now, inputs, keeps_covariances)
-            yield FilterSegment(chunk, is_recorded[begin : begin + length], results)
+            yield FilterSegment(of_segment, is_recorded[begin : begin + length], results)
             now = results.end
 
     def arguments(self, parameters: Sequence[float] | Array) -> Array:

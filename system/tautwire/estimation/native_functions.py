@@ -107,9 +107,9 @@ class UntranslatableError(TautwireError):
 def llvm_assembly(function: Function) -> tuple[str, list[float]]:
     """LLVM assembly that defines ``run(first, count, places, strides)``: the function, ``count`` times; and constants.
 
-    ``places`` has a pointer to the first number of each argument, then of each result, to the constants, and to room
-    for ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
-    results are dense, column after column.
+    ``first`` is the number of the first time, of which zero is where ``places`` point to: to the first number of each
+    argument, then of each result, to the constants, and to room for ``function.sz_w()`` numbers; ``strides`` tell by
+    how many numbers each moves from one time to the next. Arguments and results are dense, column after column.
 
     Raises UntranslatableError.
     """

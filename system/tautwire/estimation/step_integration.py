@@ -47,16 +47,17 @@ def compiled(function: AnyFunction) -> AnyFunction:
 
     It may make no arrays: to count references to arrays would take a seventh of a filter's time.
     """
-    return _compiled(function, _nrt=False)
+    return _compiled(function, makes_arrays=False)
 
 
 def compiled_with_arrays(function: AnyFunction) -> AnyFunction:
     """As :func:`compiled`, of a function that makes arrays, or calls one of NumPy's that may."""
-    return _compiled(function, _nrt=True)
+    return _compiled(function, makes_arrays=True)
 
 
-def _compiled(function: AnyFunction, **options: Any) -> AnyFunction:
-    options |= {"nogil": True, "error_model": "numpy"}
+def _compiled(function: AnyFunction, makes_arrays: bool) -> AnyFunction:
+    # A function that is called inherits the option unless it states its own.
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": makes_arrays}
     try:
         machine_code: Any = njit(cache=True, **options)(function)
     except RuntimeError:
