@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from tautwire_fmu.laws.effects import DAMPING, HANGING_LOAD, PAYLOAD, RELAXATION, UNLISTED
@@ -72,6 +72,20 @@ def most_parsimonious(
     top = max((trial.evidence for trial in scores), default=0.0)
     tied = [trial for trial in scores if top - trial.evidence < policy.tie(top, has_disturbance)]
     return min(tied, key=_complexity, default=None)
+
+
+def misfitted_rival(
+    best: CandidateScore, scores: Collection[CandidateScore], policy: SelectionPolicy
+) -> CandidateScore | None:
+    """Strongest candidate of another effect whose fit may be in the wrong valley, if it comes near the best one."""
+    others = [
+        score
+        for score in scores
+        if score.hypothesis.effect is not best.hypothesis.effect
+        and any(parameter.grid_values for parameter in score.hypothesis.parameters)
+    ]
+    rival = max(others, key=lambda score: score.evidence, default=None)
+    return rival if rival and rival.evidence >= policy.min_rival_evidence_ratio * best.evidence else None
 
 
 def _complexity(trial: CandidateScore) -> tuple[int, bool, float]:

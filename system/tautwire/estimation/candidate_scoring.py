@@ -10,11 +10,12 @@ from ..robot.schema import Robot
 from .candidate_fits import (
     coarse_validation_likelihood,
     fit_candidates,
+    fit_in_another_valley,
     leaves_noise,
     maximised_validation_likelihood,
 )
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
-from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
+from .candidate_scores import CandidateScore, misfitted_rival, most_parsimonious, unfitted_score
 from .disturbance_posterior import disturbance_prior
 from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
@@ -88,6 +89,8 @@ def _scores_beside_disturbance(
         baseline = pending.result()
     scores = {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
     scores |= _refitted_beside_own_disturbance(context, label, accepted, scores, baseline)
+    if not accepted:
+        scores |= _refitted_in_other_valleys(context, label, starts, scores, baseline)
     try:
         context.time_limit.check()
         return _with_exact_baseline(context, search_round, baseline, scores)
@@ -118,6 +121,37 @@ def _refitted_beside_own_disturbance(
     }
     refits = fit_candidates(context, f"{label}, own disturbance", tasks, estimation, baseline)
     return {h: score for h, score in refits.items() if score.evidence > scores[h].evidence}
+
+
+def _refitted_in_other_valleys(
+    context: IdentificationContext,
+    label: str,
+    starts: Starts,
+    scores: Mapping[Hypothesis, CandidateScore],
+    baseline: float,
+) -> dict[Hypothesis, CandidateScore]:
+    """Scores of the best candidate and a rival that was fitted in the wrong valley, if the rival explains more then.
+
+    For what is nonlinear and large in the first round: its disturbance has to make up for all that is missed.
+    """
+    policy, estimation, workers = context.policy.selection, context.split.estimation, context.workers
+    best = most_parsimonious(list(scores.values()), policy, has_disturbance=True)
+    rival = best and misfitted_rival(best, scores.values(), policy)
+    if best is None or rival is None:
+        return {}
+    tolerance = context.policy.fit.coarse_cost_tolerance
+    tasks = [FitTask((s.hypothesis,), (s.fit.robot, *starts[s.hypothesis]), -inf, tolerance) for s in (best, rival)]
+    calls = [(context.fitter, task, estimation, policy) for task in tasks]
+    robots = dict(workers.map_unordered(fit_in_another_valley, calls))
+    if robots[1] is None:
+        return {}
+    refit_tasks = {
+        task.chosen[-1]: replace(task, starts=(robots[number] or task.starts[0],), disturbance_refits=2)
+        for number, task in enumerate(tasks)
+    }
+    refits = fit_candidates(context, f"{label}, other valleys", refit_tasks, estimation, baseline)
+    strongest = most_parsimonious(list(refits.values()), policy)
+    return refits if strongest and strongest.hypothesis == rival.hypothesis else {}
 
 
 def _with_exact_baseline(

@@ -162,6 +162,15 @@ def grid_points(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
         yield [dict(zip(names, (*scale_values, *values), strict=True)) for values in shaped]
 
 
+def starts_by_shape(robot: Robot, hypothesis: Hypothesis) -> list[list[Robot]]:
+    """The robot with a hypothesis at each grid point, by the values that shape the effect; empty where it has none."""
+    start = hypothesis.setting(robot)
+    return [
+        [robot.with_effect(EffectSetting(start.name, {**start.values, **values}, start.cables)) for values in of_shape]
+        for of_shape in zip(*grid_points(hypothesis), strict=True)
+    ]
+
+
 def _gain_at(fitter: Fitter, task: GridTask, baseline: Baseline, values: Mapping[str, float]) -> float:
     """Gain of log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
     start = task.chosen[-1].setting(task.robot)
