@@ -7,12 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.estimation.candidate_fits import coarse_validation_likelihood, fit_model
+from tautwire.estimation.candidate_fits import coarse_validation_likelihood, fit_at_another_optimum, fit_model
+from tautwire.estimation.candidate_proposals import FitTask
+from tautwire.estimation.disturbance import OrnsteinUhlenbeck
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter, NoFitError
+from tautwire.estimation.policy import SelectionPolicy
+from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -36,3 +41,36 @@ def test_a_fit_whose_start_has_no_finite_output_begins_at_the_default_values() -
     assert fit.values == pytest.approx(from_default_values.values)
     likelihood = coarse_validation_likelihood(context.fitter, start, [HYSTERESIS], context.split.validation)
     assert np.isfinite(likelihood)
+
+
+def with_hysteresis(force: float, yield_strain: float) -> Robot:
+    values = {"force": force, "yield_strain": yield_strain}
+    return ROBOT.with_effect(EffectSetting("hysteresis", values, ROBOT.cable_numbers))
+
+
+@pytest.mark.parametrize(("fitted", "is_astray"), [((10.0, 7e-5), True), ((300.0, 1.2e-4), False)])
+def test_a_hysteresis_that_a_large_disturbance_led_astray_is_found_at_its_own_optimum(
+    fitted: tuple[float, float], is_astray: bool
+) -> None:
+    recording = recorded("three", 3, {"hysteresis": {"force": 300.0, "yield_strain": 1.2e-4}}).first(600)
+    noise = estimate_noise(ROBOT, recording)
+    median = disturbance_prior(ROBOT, noise).median
+    large = replace(median, force=OrnsteinUhlenbeck(100.0, 1.0), position=OrnsteinUhlenbeck(0.01, 1.0))
+    fitter = Fitter(replace(noise, disturbance=large))
+    data = split_data(ROBOT, noise, recording, recording).estimation
+    task = FitTask((HYSTERESIS,), (with_hysteresis(*fitted),), -np.inf, 1e-4)
+    robot = fit_at_another_optimum(fitter, task, data, SelectionPolicy())
+    assert (robot is not None) == is_astray
+    if robot is not None:
+        assert robot.effects[0].values["force"] == pytest.approx(300.0, rel=0.1)
+        assert robot.effects[0].values["yield_strain"] == pytest.approx(1.2e-4, rel=0.1)
+
+
+def test_an_optimum_that_cannot_be_reached_from_anywhere_is_none() -> None:
+    noise = estimate_noise(ROBOT, RECORDING)
+    fitter = Fitter(replace(noise, disturbance=disturbance_prior(ROBOT, noise).median))
+    data = split_data(ROBOT, noise, RECORDING, RECORDING).estimation
+    payload = next(h for h in hypotheses(ROBOT) if h.effect.name == "payload")
+    weightless = ROBOT.with_effect(EffectSetting("payload", {"mass": -2.0 * ROBOT.platform.mass}, ()))
+    task = FitTask((payload,), (weightless,), -np.inf, 1e-4)
+    assert fit_at_another_optimum(fitter, task, data, SelectionPolicy()) is None

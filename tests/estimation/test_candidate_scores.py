@@ -9,6 +9,7 @@ from tautwire.estimation.candidate_proposals import shortlist
 from tautwire.estimation.candidate_scores import (
     CandidateScore,
     load_before_offsets,
+    misfitted_rival,
     most_parsimonious,
     unfitted_score,
     without_fast_relaxations,
@@ -106,6 +107,16 @@ def test_of_those_alike_one_of_the_list_is_taken() -> None:
     near, far = (CandidateScore(payload, fit, evidence, 1.0) for evidence in (910.0, 890.0))
     assert most_parsimonious([better, near], SelectionPolicy(), has_disturbance=True) is near
     assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
+
+
+def test_a_rival_that_may_be_misfitted_is_nonlinear_strong_and_of_another_effect() -> None:
+    fit, policy = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0))), SelectionPolicy()
+    evidences = {"relaxation": 1000.0, "modulus": 900.0, "hysteresis": 410.0, "slack": 390.0}
+    scores = [CandidateScore(Hypothesis(BY_NAME[name], (1, 2, 3)), fit, e, 1.0) for name, e in evidences.items()]
+    relaxation, _, hysteresis, slack = scores
+    assert misfitted_rival(relaxation, scores, policy) is hysteresis
+    assert misfitted_rival(relaxation, [relaxation, slack], policy) is None
+    assert misfitted_rival(hysteresis, scores[:3], policy) is None
 
 
 @pytest.mark.parametrize("load", ["hanging_load", "payload"])

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tautwire.estimation import candidate_scoring
-from tautwire.estimation.candidate_proposals import SearchRound
+from tautwire.estimation.candidate_proposals import FitTask, SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
 from tautwire.estimation.disturbance import OrnsteinUhlenbeck
 from tautwire.estimation.disturbance_posterior import disturbance_prior
@@ -65,6 +65,39 @@ def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_
     monkeypatch.setattr(candidate_scoring, "fit_candidates", lambda _, __, tasks, *___: refitted.extend(tasks) or {})
     candidate_scoring._refitted_beside_own_disturbance(context, "round 1", (), scores, 0.0)
     assert [each.effect.name for each in refitted] == ([best_on_fit, *(set(evidence) - {best_on_fit})] * is_refitted)
+
+
+@pytest.mark.parametrize(
+    ("is_astray", "refit_evidence", "is_replaced"),
+    [(True, 900.0, True), (True, 700.0, False), (False, 900.0, False)],
+)
+def test_a_rival_that_was_led_astray_replaces_the_best_if_it_explains_more_at_its_own_optimum(
+    is_astray: bool, refit_evidence: float, is_replaced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    best, rival = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("relaxation", "hysteresis"))
+    starts = {h: (robot.with_effect(h.setting(robot)),) for h in (best, rival)}
+    fits = {h: Fit.without_parameters(robots[0]) for h, robots in starts.items()}
+    scores = {h: CandidateScore(h, fits[h], e, 1.0) for h, e in ((best, 500.0), (rival, 300.0))}
+    refits = {h: CandidateScore(h, fits[h], e, 1.0) for h, e in ((best, 800.0), (rival, refit_evidence))}
+    elsewhere = robot.with_effect(replace(rival.setting(robot), values={"force": 99.0, "yield_strain": 1e-3}))
+    begun: list[Robot] = []
+
+    def optimum(_: Fitter, task: FitTask, *__: object) -> Robot | None:
+        return elsewhere if is_astray and task.chosen == (rival,) else None
+
+    def fitted(_: object, __: str, tasks: dict[Hypothesis, FitTask], *___: object) -> dict[Hypothesis, CandidateScore]:
+        begun.extend(task.starts[0] for task in tasks.values())
+        return refits
+
+    monkeypatch.setattr(candidate_scoring, "fit_at_another_optimum", optimum)
+    monkeypatch.setattr(candidate_scoring, "fit_candidates", fitted)
+    assert candidate_scoring._refitted_at_other_optima(context, "round 1", starts, scores, 0.0) == (
+        refits if is_replaced else {}
+    )
+    assert begun == ([starts[best][0], elsewhere] if is_astray else [])
 
 
 def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:

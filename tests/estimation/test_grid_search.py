@@ -8,7 +8,7 @@ import pytest
 from tautwire.errors import UnreachableError
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, split_data
-from tautwire.estimation.grid_search import grid_points, grid_search, misleading_predictions
+from tautwire.estimation.grid_search import grid_points, grid_search, misleading_predictions, starts_by_shape
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
@@ -145,3 +145,11 @@ def test_smaller_values_are_spared_once_one_is_not_felt(monkeypatch: pytest.Monk
     monkeypatch.setattr(fitter, "judged", lambda *asked: runs.append(asked[0]) or judged(*asked))
     grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})
     assert 2 < len(runs) < 1 + len(SLACK.parameters[0].grid_values)
+
+
+def test_starts_are_grouped_by_the_values_that_shape_an_effect() -> None:
+    robot = example("three")
+    groups = [[each.effects[0].values for each in group] for group in starts_by_shape(robot, STICKY)]
+    assert [{values["yield_strain"] for values in group} for group in groups] == [{1e-5}, {1e-4}, {1e-3}]
+    assert all([values["force"] for values in group] == [1000.0, 100.0, 10.0] for group in groups)
+    assert starts_by_shape(robot, VISCOUS) == []

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from functools import reduce
-from math import inf, nan
+from math import inf, isfinite, nan
 
 import numpy as np
 
@@ -59,11 +59,12 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
     return ValidatedFit(fit, log_likelihood, mean_square, explained) if np.isfinite(log_likelihood) else None
 
 
-def fit_in_another_valley(fitter: Fitter, task: FitTask, data: DataSet, policy: SelectionPolicy) -> Robot | None:
-    """The robot with a fit under a small disturbance; None where it is no more probable than the task's first start.
+def fit_at_another_optimum(fitter: Fitter, task: FitTask, data: DataSet, policy: SelectionPolicy) -> Robot | None:
+    """The robot at a better local optimum than the task's first start, which was fitted; None where there is none.
 
-    Each is judged beside an improved disturbance. Under that of a model without it, which had to be large, a nonlinear
-    effect may be fitted in the wrong valley: a hysteresis of 179 N was one of 10 N.
+    Fits begin at the best of the task's starts and of each shape's grid points, under a small disturbance: that of a
+    model without the effect, which had to be large, leads a nonlinear one astray, a hysteresis of 179 N to 10 N. Both
+    optima are judged beside disturbances improved for them.
     """
     chosen, fitted = task.chosen, task.starts[0]
     median = disturbance_prior(fitted, fitter.noise, fitter.policy.disturbance).median
@@ -71,24 +72,26 @@ def fit_in_another_valley(fitter: Fitter, task: FitTask, data: DataSet, policy: 
 
     def log_likelihood(under: Fitter, robot: Robot) -> float:
         try:
-            return under.log_likelihood(robot, chosen, data)
+            value = under.log_likelihood(robot, chosen, data)
         except UnreachableError:
             return -inf
+        return value if isfinite(value) else -inf
 
-    def improved_log_likelihood(under: Fitter, robot: Robot) -> float:
-        return log_likelihood(with_improved_disturbance(under, robot, chosen, data), robot)
+    def improved_log_likelihood(robot: Robot) -> float:
+        improved = (with_improved_disturbance(under, robot, chosen, data) for under in (fitter, under_median))
+        return max(log_likelihood(under, robot) for under in improved)
 
     def best_of(robots: Iterable[Robot]) -> Robot:
         return max(robots, key=lambda robot: log_likelihood(under_median, robot))
 
-    starts = [best_of(task.starts), *map(best_of, starts_by_shape(fitted, chosen[-1]))]
-    try:
-        fits = [under_median.fit_from([start], chosen, data, -inf, task.cost_tolerance).robot for start in starts]
-    except (UnreachableError, NoFitError):
+    optima = []
+    for starts in (task.starts, *starts_by_shape(fitted, chosen[-1])):
+        with suppress(UnreachableError, NoFitError):
+            optima.append(under_median.fit_from([best_of(starts)], chosen, data, -inf, task.cost_tolerance).robot)
+    if not optima:
         return None
-    robot, before = best_of(fits), improved_log_likelihood(fitter, fitted)
-    gain = improved_log_likelihood(under_median, robot) - before
-    return robot if gain > policy.coarse_tie(before) else None
+    best, before = best_of(optima), improved_log_likelihood(fitted)
+    return best if improved_log_likelihood(best) - before > policy.coarse_tie(before) else None
 
 
 def fit_candidates(

@@ -77,7 +77,7 @@ def most_parsimonious(
 def misfitted_rival(
     best: CandidateScore, scores: Collection[CandidateScore], policy: SelectionPolicy
 ) -> CandidateScore | None:
-    """Strongest candidate of another effect whose fit may be in the wrong valley, if it comes near the best one."""
+    """Strongest candidate of another effect whose fit may be at the wrong optimum, if it comes near the best one."""
     others = [
         score
         for score in scores

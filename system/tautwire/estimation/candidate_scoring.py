@@ -9,8 +9,8 @@ from math import inf
 from ..robot.schema import Robot
 from .candidate_fits import (
     coarse_validation_likelihood,
+    fit_at_another_optimum,
     fit_candidates,
-    fit_in_another_valley,
     leaves_noise,
     maximised_validation_likelihood,
 )
@@ -90,7 +90,7 @@ def _scores_beside_disturbance(
     scores = {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
     scores |= _refitted_beside_own_disturbance(context, label, accepted, scores, baseline)
     if not accepted:
-        scores |= _refitted_in_other_valleys(context, label, starts, scores, baseline)
+        scores |= _refitted_at_other_optima(context, label, starts, scores, baseline)
     try:
         context.time_limit.check()
         return _with_exact_baseline(context, search_round, baseline, scores)
@@ -123,14 +123,14 @@ def _refitted_beside_own_disturbance(
     return {h: score for h, score in refits.items() if score.evidence > scores[h].evidence}
 
 
-def _refitted_in_other_valleys(
+def _refitted_at_other_optima(
     context: IdentificationContext,
     label: str,
     starts: Starts,
     scores: Mapping[Hypothesis, CandidateScore],
     baseline: float,
 ) -> dict[Hypothesis, CandidateScore]:
-    """Scores of the best candidate and a rival that was fitted in the wrong valley, if the rival explains more then.
+    """Scores of the best candidate and a rival that was fitted at the wrong optimum, if it explains more then.
 
     For what is nonlinear and large in the first round: its disturbance has to make up for all that is missed.
     """
@@ -142,14 +142,18 @@ def _refitted_in_other_valleys(
     tolerance = context.policy.fit.coarse_cost_tolerance
     tasks = [FitTask((s.hypothesis,), (s.fit.robot, *starts[s.hypothesis]), -inf, tolerance) for s in (best, rival)]
     calls = [(context.fitter, task, estimation, policy) for task in tasks]
-    robots = dict(workers.map_unordered(fit_in_another_valley, calls))
+    try:
+        robots = dict(workers.map_unordered(fit_at_another_optimum, calls))
+    except OutOfTimeError:
+        context.leave_untried(f"other optima of {rival.hypothesis.label(context.robot)} ({label})")
+        return {}
     if robots[1] is None:
         return {}
     refit_tasks = {
         task.chosen[-1]: replace(task, starts=(robots[number] or task.starts[0],), disturbance_refits=2)
         for number, task in enumerate(tasks)
     }
-    refits = fit_candidates(context, f"{label}, other valleys", refit_tasks, estimation, baseline)
+    refits = fit_candidates(context, f"{label}, other optima", refit_tasks, estimation, baseline)
     strongest = most_parsimonious(list(refits.values()), policy)
     return refits if strongest and strongest.hypothesis == rival.hypothesis else {}
 
