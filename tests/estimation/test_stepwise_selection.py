@@ -202,6 +202,39 @@ def test_what_was_dropped_beside_another_does_not_come_back_in_its_place(monkeyp
     selection.eliminate()
 
 
+@pytest.mark.parametrize(
+    ("has_disturbance", "best_name", "loss", "is_replaced"),
+    [
+        (True, "relaxation", 4.0, True),
+        (True, "relaxation", 40.0, False),
+        (True, "damping", 40.0, True),
+        (True, "damping", 140.0, False),
+        (False, "relaxation", 40.0, True),
+    ],
+)
+def test_an_alternative_beside_its_own_disturbance_has_to_explain_as_much_as_what_it_replaces(
+    has_disturbance: bool, best_name: str, loss: float, is_replaced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A relaxation whose fit had suffered less under the first round's disturbance took the place of damping."""
+    context, cables = context_with(has_disturbance), (1, 2, 3)
+    fit = Fit.without_parameters(context.robot)
+    tested, best = (Hypothesis(BY_NAME[name], cables) for name in ("damping", "relaxation"))
+    if best_name == "damping":
+        tested, best = best, tested
+    payload = Hypothesis(BY_NAME["payload"], ())
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [tested, payload])
+    selection.forward_evidences = {tested: 900.0, payload: 80.0}
+    likelihoods = {(tested, payload): 5000.0, (payload, best): 5000.0 - loss}
+    monkeypatch.setattr(selection, "_validation_log_likelihood", lambda: likelihoods[tuple(selection.accepted)])
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    monkeypatch.setattr(stepwise_selection, "with_damping_for_fast_relaxations", lambda *asked: asked)
+    score = CandidateScore(best, Fit.without_parameters(context.robot), 1000.0, 1.0)
+    assert selection._replace_by(score, tested, [payload]) is is_replaced
+    assert selection.accepted == ([payload, best] if is_replaced else [tested, payload])
+    assert selection.current is (score.fit if is_replaced else fit)
+    assert (best in selection.forward_evidences) is is_replaced
+
+
 def test_what_is_accepted_again_has_the_evidence_with_which_it_came_last(monkeypatch: pytest.MonkeyPatch) -> None:
     context = context_with(has_disturbance=False)
     fit = Fit.without_parameters(context.robot)

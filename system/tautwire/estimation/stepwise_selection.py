@@ -31,7 +31,7 @@ from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter, NoFitError
 from .residual_analysis import residuals_are_white
-from .selection_result import SelectionResult, with_disturbance_beside
+from .selection_result import SelectionResult, with_damping_for_fast_relaxations, with_disturbance_beside
 from .smoothed_states import calibrated_robot
 from .time_limit import OutOfTimeError
 from .trace_result import Candidate, Errors
@@ -226,12 +226,12 @@ class _StepwiseSelection:
             contender = self._comparable(score, others)
             # One that was not needed beside this one does not come back in its place.
             allowed = [t for t in alternatives if not any(t.hypothesis.overlaps(each) for each in dropped)]
-            best = self._best_candidate([contender, *allowed], without.robot)
+            best, required = self._best_candidate([contender, *allowed], without.robot), self._required_evidence(others)
+            may_replace = best is not None and best is not contender and swaps < policy.max_swaps
+            is_replaced = best is not None and may_replace and self._replace_by(best, tested, others)
             if known_scores is None:
-                required = self._required_evidence(others)
-                self.candidates += [t.candidate(number, t is best, required) for t in alternatives]
-            if best is not None and best is not contender and swaps < policy.max_swaps:
-                self._accept_beside(others, best)
+                self.candidates += [t.candidate(number, is_replaced and t is best, required) for t in alternatives]
+            if best is not None and is_replaced:
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
                 tested, swaps = self.accepted[-1], swaps + 1
                 score = contender = best
@@ -268,10 +268,36 @@ class _StepwiseSelection:
     def _accept(self, hypotheses: list[Hypothesis], fit: Fit) -> None:
         """Take hypotheses with their fit in place of those accepted so far, then fit the disturbance beside them.
 
-        They stand as they are where time ends meanwhile.
+        They stand as they are where time ends meanwhile. A relaxation that becomes faster than a sample is damping.
         """
         self.accepted, self.current = hypotheses, fit
+        if not self.context.fitter.has_disturbance:
+            return
         self.context, self.current = with_disturbance_beside(self.context, hypotheses, fit)
+        limits = with_damping_for_fast_relaxations(self.context, hypotheses, self.current)
+        self.context, self.accepted, self.current = limits
+        for old, new in zip(hypotheses, self.accepted, strict=True):
+            if old in self.forward_evidences:
+                self.forward_evidences.setdefault(new, self.forward_evidences[old])
+
+    def _replace_by(self, best: CandidateScore, tested: Hypothesis, others: Sequence[Hypothesis]) -> bool:
+        """Replace a tested hypothesis by the best one, unless that explains less; tells whether it is replaced.
+
+        Its score may be of a round whose disturbance had to make up for both; here each has its own. One with fewer
+        parameters may explain less by what the tested one's form may leave.
+        """
+        has_disturbance = self.context.fitter.has_disturbance
+        evidences = dict(self.forward_evidences), dict(self.evidences)
+        before = self.context, self.accepted, self.current
+        log_likelihood = self._validation_log_likelihood() if has_disturbance else -np.inf
+        self._accept_beside(others, best)
+        is_simpler = best.parameter_count < len(tested.form)
+        min_log_likelihood = log_likelihood - self.context.policy.selection.tie(best.evidence, is_simpler)
+        if not has_disturbance or self._validation_log_likelihood() >= min_log_likelihood:
+            return True
+        self.context, self.accepted, self.current = before
+        self.forward_evidences, self.evidences = evidences
+        return False
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
         """The score to hold against alternatives: beside a disturbance that of the round in which these were scored.
@@ -283,11 +309,15 @@ class _StepwiseSelection:
 
     def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
         """Log-likelihood ratio on validation data of all accepted hypotheses against the others at their best there."""
-        validation = self.context.split.validation
-        fitter, robot = self.context.fitter, self.current.robot
-        log_likelihood = fitter.log_likelihood(robot, self.accepted, validation)
-        if fitter.has_disturbance:
-            log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, robot, self.accepted, validation))
+        log_likelihood = self._validation_log_likelihood()
         return log_likelihood - maximised_validation_likelihood(
             self.context, without.robot, others, log_likelihood - self.context.evidence_threshold()
         )
+
+    def _validation_log_likelihood(self) -> float:
+        """Log-likelihood of validation data under all accepted hypotheses; whichever disturbance serves them better."""
+        fitter, robot, validation = self.context.fitter, self.current.robot, self.context.split.validation
+        log_likelihood = fitter.log_likelihood(robot, self.accepted, validation)
+        if fitter.has_disturbance:
+            log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, robot, self.accepted, validation))
+        return log_likelihood
