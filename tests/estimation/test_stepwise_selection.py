@@ -227,7 +227,6 @@ def test_an_alternative_beside_its_own_disturbance_has_to_explain_as_much_as_wha
     likelihoods = {(tested, payload): 5000.0, (payload, best): 5000.0 - loss}
     monkeypatch.setattr(selection, "_validation_log_likelihood", lambda: likelihoods[tuple(selection.accepted)])
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
-    monkeypatch.setattr(stepwise_selection, "with_damping_for_fast_relaxations", lambda *asked: asked)
     score = CandidateScore(best, Fit.without_parameters(context.robot), 1000.0, 1.0)
     assert selection._replace_by(score, tested, [payload]) is is_replaced
     assert selection.accepted == ([payload, best] if is_replaced else [tested, payload])
@@ -367,6 +366,31 @@ def test_beside_a_disturbance_a_relaxation_within_a_sample_is_damping(has_distur
     if has_disturbance:
         damped = context.robot.with_effect(EffectSetting("damping", {"damping": 1e9}, cables))
         assert selection._best_candidate(scores[1:], damped) is None
+
+
+@pytest.mark.parametrize(("time", "name"), [(1e-3, "damping"), (0.1, "relaxation")])
+def test_a_relaxation_that_its_disturbance_made_faster_than_a_sample_is_replaced_by_damping(
+    time: float, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In the round that scored both it took 0.2 s."""
+    context, cables = context_with(has_disturbance=True), (1, 2, 3)
+    robot = context.robot
+    relaxation, damping = (Hypothesis(BY_NAME[each], cables) for each in ("relaxation", "damping"))
+    fits = [
+        Fit.without_parameters(robot.with_effect(EffectSetting("relaxation", {"modulus": 1e11, "time": each}, cables)))
+        for each in (0.2, time)
+    ]
+    damped = Fit.without_parameters(robot.with_effect(damping.setting(robot)))
+    selection = stepwise_selection._StepwiseSelection(context, fits[1], context.fitter, [relaxation])
+    selection.forward_evidences = {relaxation: 1000.0}
+    scores = [CandidateScore(relaxation, fits[0], 1000.0, 1.0), CandidateScore(damping, damped, 700.0, 1.0)]
+    selection.complete_rounds[(), None] = scores
+    monkeypatch.setattr(selection, "_evidence", lambda without, others: 1500.0)
+    monkeypatch.setattr(selection, "_validation_log_likelihood", lambda: 0.0)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    selection.eliminate()
+    assert [hypothesis.effect.name for hypothesis in selection.accepted] == [name]
 
 
 @pytest.mark.parametrize(("has_disturbance", "name"), [(True, "hanging_load"), (False, "sensor_offset")])

@@ -63,7 +63,7 @@ def fit_at_another_optimum(fitter: Fitter, task: FitTask, data: DataSet, policy:
     """The robot at a better local optimum than the task's first start, which was fitted; None where there is none.
 
     Fits begin at the best of the task's starts and of each shape's grid points, under a small disturbance: that of a
-    model without the effect, which had to be large, leads a nonlinear one astray, a hysteresis of 179 N to 10 N. Both
+    model without the effect, which had to be large, leads a nonlinear one astray, a hysteresis of 164 N to 46 N. Both
     optima are judged beside disturbances improved for them.
     """
     chosen, fitted = task.chosen, task.starts[0]

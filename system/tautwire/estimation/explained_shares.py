@@ -38,7 +38,7 @@ from .likelihood import Likelihood
 from .measured_outputs import Outputs, SimulatedOutputs, measured_outputs, output_names, output_residuals
 from .parameter_fit import Fit, Fitter
 from .policy import SizePolicy
-from .smoothed_states import calibrate, with_initial_state
+from .smoothed_states import calibrate, calibrated_robot, with_initial_state
 from .trace_result import Comparison, Errors
 
 Array = NDArray[np.float64]
@@ -185,6 +185,14 @@ def missed_without_effects(context: IdentificationContext, declared: Fitter, dat
     )
     # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
     return min(_missed(recording, outputs, floor), _missed(data.recording, outputs_as_declared, floor))
+
+
+def missed_on_validation(context: IdentificationContext, *robots: Robot) -> tuple[list[float], Errors]:
+    """What robots with their effects, calibrated on FIT, miss on CHECK beside noise, and that noise: the last one's."""
+    estimation, validation = context.split.estimation, context.split.validation
+    calibrated = [calibrated_robot(context.fitter, robot, estimation) for robot in robots]
+    floor = sensor_noise_floor(context.fitter, calibrated[-1], validation)
+    return [missed_with_effects(context.fitter, robot, validation, floor) for robot in calibrated], floor
 
 
 def missed_with_effects(fitter: Fitter, robot: Robot, data: DataSet, floor: Errors) -> float:

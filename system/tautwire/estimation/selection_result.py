@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from tautwire_fmu.laws.effects import DAMPING, RELAXATION
-
 from ..robot.schema import Robot
 from .candidate_fits import fit_model
-from .candidate_scores import setting_of
 from .disturbance import Disturbance
 from .disturbance_fit import joint_fit, with_fitted_disturbance
 from .hypotheses import Hypothesis
@@ -56,33 +51,6 @@ def with_disturbance_beside(
     context = replace(context, fitter=fitter)
     fitter, fit = joint_fit(fitter, fit_model(context, accepted, fit.robot), accepted, context.split.estimation)
     return replace(context, fitter=fitter), fit
-
-
-def with_damping_for_fast_relaxations(
-    context: IdentificationContext, accepted: Sequence[Hypothesis], fit: Fit
-) -> tuple[IdentificationContext, list[Hypothesis], Fit]:
-    """The accepted hypotheses and their fit, with damping for relaxations that the fit made faster than a sample.
-
-    To what is slower, a branch of modulus E and time ``tau`` is a damping of E tau. It is taken where it explains
-    validation data as well, within what a coarse fit leaves.
-    """
-    data = context.split.validation
-    sample_interval = float(np.median(np.diff(data.recording.time)))
-    for relaxation in (each for each in accepted if each.effect is RELAXATION and each.form == RELAXATION.forms[0]):
-        limit, values = Hypothesis(DAMPING, relaxation.cables), setting_of(fit.robot, relaxation).values
-        if values["time"] >= sample_interval or any(limit.overlaps(other) for other in accepted):
-            continue
-        declared = limit.neutral(context.robot, limit.cables).values["damping"]
-        damping = limit.setting(context.robot, {"damping": declared + values["modulus"] * values["time"]})
-        chosen = [limit if each is relaxation else each for each in accepted]
-        beside, own_fit = with_disturbance_beside(
-            context, chosen, fit_model(context, chosen, fit.robot.with_effect(damping))
-        )
-        log_likelihood = context.fitter.log_likelihood(fit.robot, accepted, data)
-        loss = log_likelihood - beside.fitter.log_likelihood(own_fit.robot, chosen, data)
-        if loss <= context.policy.selection.coarse_tie(log_likelihood):
-            return beside, chosen, own_fit
-    return context, list(accepted), fit
 
 
 def without_least_evident(

@@ -10,7 +10,7 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -26,15 +26,14 @@ from .candidate_scores import (
 )
 from .candidate_scoring import score_candidates
 from .disturbance_fit import marginal_log_likelihood
-from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
+from .explained_shares import missed_on_validation, missed_without_effects
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter, NoFitError
 from .residual_analysis import residuals_are_white
-from .selection_result import SelectionResult, with_damping_for_fast_relaxations, with_disturbance_beside
-from .smoothed_states import calibrated_robot
+from .selection_result import SelectionResult, with_disturbance_beside
 from .time_limit import OutOfTimeError
-from .trace_result import Candidate, Errors
+from .trace_result import Candidate
 
 
 def select_effects(context: IdentificationContext) -> SelectionResult:
@@ -77,9 +76,8 @@ class _StepwiseSelection:
     """A selection in progress; at any time its accepted hypotheses and their fit belong together.
 
     ``evidences`` are those of the hypotheses that passed the backward elimination, ``forward_evidences`` those with
-    which they were accepted; ``survivors`` are the hypotheses that it left last. ``complete_rounds`` are by the
-    hypotheses beside which a round was scored, and the one that it was to replace. ``without_effects`` fits the robot
-    without any.
+    which they were accepted; ``survivors`` are the hypotheses that it left last. ``complete_rounds`` are by hypotheses
+    beside which a round was scored, and the one that it was to replace; ``without_effects`` fits the robot as it is.
     """
 
     context: IdentificationContext
@@ -138,7 +136,7 @@ class _StepwiseSelection:
             return False
         # The fits are there: time that is up must not lose them.
         with self.context.time_limit.suspended():
-            (left_without, left), floor = self._missed_on_validation(without, score.fit.robot)
+            (left_without, left), floor = missed_on_validation(self.context, without, score.fit.robot)
             validation = self.context.split.validation
             missed = missed_without_effects(self.context, self.without_effects, validation, floor)
         return left_without - left >= self.context.policy.size.min_share_elsewhere * missed
@@ -146,9 +144,8 @@ class _StepwiseSelection:
     def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
         """Evidence that a hypothesis needs beside the others."""
         first_evidence = next(iter(self.forward_evidences.values()), 0.0) if others else 0.0
-        has_disturbance = self.context.fitter.has_disturbance
-        threshold = self.context.evidence_threshold()
-        return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
+        threshold, fitter = self.context.evidence_threshold(), self.context.fitter
+        return self.context.policy.selection.required_evidence(threshold, first_evidence, fitter.has_disturbance)
 
     def _leaves_little(self, scores: Sequence[CandidateScore]) -> bool:
         """Whether the accepted hypotheses leave little, or nothing explains much of what a small random force may be.
@@ -156,22 +153,15 @@ class _StepwiseSelection:
         Neither they nor any other that the last round, with these ``scores``, established.
         """
         policy, validation = self.context.policy.size, self.context.split.validation
-        (left,), floor = self._missed_on_validation(self.current.robot)
+        (left,), floor = missed_on_validation(self.context, self.current.robot)
         missed = missed_without_effects(self.context, self.without_effects, validation, floor)
         if left < policy.max_left_share * missed:
             return True
         established = [score.fit.robot for score in scores if score.evidence > self.context.evidence_threshold()]
         enough = (1.0 - policy.min_explained_share) * missed
         return missed < policy.max_size_of_disturbance**2 and not (
-            left <= enough or any(self._missed_on_validation(robot)[0][0] <= enough for robot in established)
+            left <= enough or any(missed_on_validation(self.context, robot)[0][0] <= enough for robot in established)
         )
-
-    def _missed_on_validation(self, *robots: Robot) -> tuple[list[float], Errors]:
-        """What robots with their effects, calibrated on FIT, miss on CHECK; the last one's noise counts as none."""
-        context, validation = self.context, self.context.split.validation
-        calibrated = [calibrated_robot(context.fitter, robot, context.split.estimation) for robot in robots]
-        floor = sensor_noise_floor(context.fitter, calibrated[-1], validation)
-        return [missed_with_effects(context.fitter, robot, validation, floor) for robot in calibrated], floor
 
     def _best_candidate(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
         """Best candidate of a round; beside a disturbance the likelier one of two that samples hardly tell apart."""
@@ -194,7 +184,7 @@ class _StepwiseSelection:
             return best
         # The fits are there: time that is up must not lose them.
         with self.context.time_limit.suspended():
-            (missed, left, least), _ = self._missed_on_validation(without, simplest.fit.robot, best.fit.robot)
+            (missed, left, least), _ = missed_on_validation(self.context, without, simplest.fit.robot, best.fit.robot)
         return simplest if left - least <= self.context.policy.size.max_left_share_of_form * (missed - least) else best
 
     def eliminate(self) -> None:
@@ -268,17 +258,10 @@ class _StepwiseSelection:
     def _accept(self, hypotheses: list[Hypothesis], fit: Fit) -> None:
         """Take hypotheses with their fit in place of those accepted so far, then fit the disturbance beside them.
 
-        They stand as they are where time ends meanwhile. A relaxation that becomes faster than a sample is damping.
+        They stand as they are where time ends meanwhile.
         """
         self.accepted, self.current = hypotheses, fit
-        if not self.context.fitter.has_disturbance:
-            return
         self.context, self.current = with_disturbance_beside(self.context, hypotheses, fit)
-        limits = with_damping_for_fast_relaxations(self.context, hypotheses, self.current)
-        self.context, self.accepted, self.current = limits
-        for old, new in zip(hypotheses, self.accepted, strict=True):
-            if old in self.forward_evidences:
-                self.forward_evidences.setdefault(new, self.forward_evidences[old])
 
     def _replace_by(self, best: CandidateScore, tested: Hypothesis, others: Sequence[Hypothesis]) -> bool:
         """Replace a tested hypothesis by the best one, unless that explains less; tells whether it is replaced.
@@ -286,26 +269,20 @@ class _StepwiseSelection:
         Its score may be of a round whose disturbance had to make up for both; here each has its own. One with fewer
         parameters may explain less by what the tested one's form may leave.
         """
-        has_disturbance = self.context.fitter.has_disturbance
-        evidences = dict(self.forward_evidences), dict(self.evidences)
-        before = self.context, self.accepted, self.current
-        log_likelihood = self._validation_log_likelihood() if has_disturbance else -np.inf
+        before = replace(self, evidences=dict(self.evidences), forward_evidences=dict(self.forward_evidences))
+        log_likelihood = self._validation_log_likelihood()
         self._accept_beside(others, best)
-        is_simpler = best.parameter_count < len(tested.form)
-        min_log_likelihood = log_likelihood - self.context.policy.selection.tie(best.evidence, is_simpler)
-        if not has_disturbance or self._validation_log_likelihood() >= min_log_likelihood:
+        max_loss = self.context.policy.selection.tie(best.evidence, best.parameter_count < len(tested.form))
+        if not self.context.fitter.has_disturbance or log_likelihood - self._validation_log_likelihood() <= max_loss:
             return True
-        self.context, self.accepted, self.current = before
-        self.forward_evidences, self.evidences = evidences
+        self.context, self.accepted, self.current = before.context, before.accepted, before.current
+        self.forward_evidences, self.evidences = before.forward_evidences, before.evidences
         return False
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
-        """The score to hold against alternatives: beside a disturbance that of the round in which these were scored.
-
-        The disturbance has been fitted anew beside the accepted hypotheses since.
-        """
+        """The score to hold against alternatives: beside a disturbance today's fit with the evidence of their round."""
         known = self.complete_rounds.get((tuple(others), None), []) if self.context.fitter.has_disturbance else []
-        return next((each for each in known if each.hypothesis == score.hypothesis), score)
+        return next((replace(each, fit=score.fit) for each in known if each.hypothesis == score.hypothesis), score)
 
     def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
         """Log-likelihood ratio on validation data of all accepted hypotheses against the others at their best there."""
