@@ -274,7 +274,7 @@ VAST = {
 }
 
 
-@pytest.mark.validate(but=["long line"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("case", "reader"), [(case, reader) for case, (_, readers, _) in VAST.items() for reader in readers]
 )

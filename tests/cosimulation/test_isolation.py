@@ -117,6 +117,7 @@ def test_an_fmu_lost_in_a_step_is_named_and_what_came_before_is_kept(
     assert nothing_is_left(numbers)
 
 
+@pytest.mark.validate(but=["crash", "setup"])
 @pytest.mark.parametrize(
     ("where", "call"),
     [

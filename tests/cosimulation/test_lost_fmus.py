@@ -93,6 +93,7 @@ def test_nothing_is_written_where_nothing_was_computed(
     assert list(scratch.iterdir()) == []
 
 
+@pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="needs process groups")
 def test_ctrl_c_ends_a_run_that_hangs(robot: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     numbers = scratch.parent / "numbers"

@@ -27,7 +27,7 @@ def exact() -> np.ndarray:
     return exact_end(paper_robot())
 
 
-@pytest.mark.validate(but=["native-by_fmpy-0.01"])
+@pytest.mark.validate
 @pytest.mark.parametrize("step", [0.01, 0.001])
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: Path(importer.client).stem)
 def test_an_importer_ends_where_the_robot_ends(

@@ -127,6 +127,7 @@ def put_in(file: Path, where: str, text: str) -> None:
     file.write_text(changed, encoding="utf-8")
 
 
+@pytest.mark.validate
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path: Path) -> None:
     pytest.importorskip("material", reason="mkdocs-material is not installed: pip install mkdocs-material")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]

@@ -76,6 +76,7 @@ def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
     assert components.limitations == ()
 
 
+@pytest.mark.validate(but=["effects0", "effects4"])
 @pytest.mark.parametrize(
     ("effects", "component", "quantity", "signal", "sign"),
     [
