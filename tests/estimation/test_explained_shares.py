@@ -91,11 +91,46 @@ def test_an_effect_that_grows_has_another_amplitude_on_each_stretch() -> None:
     residual = np.linspace(-1.0, 1.0, 8000)[:, None] * signature
     every = np.ones(8000, dtype=bool)
     factors = (2.0 * np.arange(8) + 1.0) / 8.0
-    expected = students_t.ppf(0.975, 7) * np.std(factors, ddof=1) / np.sqrt(8.0)
+    expected = students_t.ppf(0.975, 6) * np.std(factors, ddof=2) / np.sqrt(8.0)
     assert amplitude_spread(residual, signature, every, 8) == pytest.approx(expected, rel=1e-3)
     assert amplitude_spread(0.0 * residual, signature, every, 8) == 0.0
     noise = np.random.default_rng(1).normal(size=(8000, 2))
     assert amplitude_spread(noise, signature, every, 8) < 0.03
+
+
+def test_drag_by_another_power_of_the_speed_keeps_its_amplitude_and_one_that_wears_off_does_not() -> None:
+    """Linear in speed, its factor to a quadratic one is 1 / v; on eight stretches speeds come in no order."""
+    every = np.ones(8000, dtype=bool)
+    speed = np.repeat([0.6, 1.3, 0.7, 1.2, 1.0, 0.5, 1.1, 0.8], 1000)[:, None] * np.ones(2)
+    quadratic, linear = speed**2, speed
+    wearing_off = np.linspace(2.0, 0.0, 8000)[:, None] * quadratic
+    assert amplitude_spread(linear - quadratic, quadratic, every, 8) < 0.05
+    assert amplitude_spread(wearing_off - quadratic, quadratic, every, 8) > 0.3
+
+
+def test_an_amplitude_that_grows_with_the_motion_is_no_form() -> None:
+    """Its factor goes from 0.5 to 1.5 with time: the signature, which grows too, must not pass for the reason."""
+    every = np.ones(8000, dtype=bool)
+    time = np.linspace(0.0, 1.0, 8000)[:, None]
+    signature = (1.0 + time) * np.ones(2)
+    assert amplitude_spread((time - 0.5) * signature, signature, every, 8) > 0.2
+
+
+def test_samples_that_were_not_measured_make_no_signature_smaller() -> None:
+    """Where half the samples lack, the factor is 1.4 times that elsewhere: no power of a signature of one size."""
+    every, signature = np.ones(8000, dtype=bool), np.ones((8000, 2))
+    is_gap = np.repeat([True, False, False, True, True, False, True, False], 1000)
+    residual = np.where(is_gap, 0.4, 0.0)[:, None] * signature
+    as_measured = residual.copy()
+    as_measured[is_gap & (np.arange(8000) % 2 == 0)] = np.nan
+    assert amplitude_spread(as_measured, signature, every, 8) > 0.8 * amplitude_spread(residual, signature, every, 8)
+
+
+def test_an_amplitude_that_depends_on_size_by_more_than_a_power_of_zero_or_two_is_no_form() -> None:
+    every = np.ones(8000, dtype=bool)
+    signature = np.repeat([1.0, 1.1, 1.04, 1.07, 1.09, 1.01, 1.03, 1.06], 1000)[:, None] * np.ones(2)
+    assert amplitude_spread(signature**5 - signature, signature, every, 8) > 0.08
+    assert amplitude_spread(signature**2 - signature, signature, every, 8) < 0.01
 
 
 def test_what_was_not_measured_or_does_not_count_tells_nothing_of_the_amplitude() -> None:

@@ -140,16 +140,28 @@ def amplitude_spread(residual: Array, signature: Array, rows: NDArray[np.bool_],
 
     With the residual r and what the effect changes, d, (N, m) both over noise, of the B stretches of the ``rows`` (N,)
 
-        c_b = sum of r d on stretch b        w = t sqrt(B / (B - 1) sum_b (c_b - mean of c)^2) / sum of d^2
+        c_b = sum of r d on stretch b     E_b = sum of d^2 there     w = t sqrt(B / (B - 2) sum_b u_b^2) / sum_b E_b
+        u_b = c_b - E_b (a + s ln(mean of d^2 on stretch b)),     |s| <= |1 + a| / 2
 
-    with t Student's of B - 1 degrees. NaN entries of r do not count.
+    with t Student's of B - 2 degrees. The slope s, by least squares beside one over b, weighed by 1 / E_b, is that of
+    an effect by another power of its signature than the formula's, 1 + 2 s / (1 + a): drag that is linear in speed has
+    s = -(1 + a) / 4. What goes with time as well counts as a change. NaN entries of r do not count.
     """
     is_counted = np.isfinite(residual) & rows[:, None]
-    products = np.where(is_counted, residual * signature, 0.0).sum(axis=1)[rows]
-    energy = float(np.sum(np.where(is_counted, signature, 0.0) ** 2))
-    by_stretch = np.array([part.sum() for part in np.array_split(products, stretch_count)])
-    spread = np.sqrt(stretch_count * np.var(by_stretch) * stretch_count / (stretch_count - 1))
-    return float(students_t.ppf(0.975, stretch_count - 1) * spread / max(energy, np.finfo(float).tiny))
+    by_sample = (residual * signature, signature**2, 1.0)
+    by_row = [np.where(is_counted, values, 0.0).sum(axis=1)[rows] for values in by_sample]
+    by_stretch, energy, count = (np.array([part.sum() for part in np.array_split(v, stretch_count)]) for v in by_row)
+    energy = energy + np.finfo(float).tiny
+    amplitude = float(by_stretch.sum() / energy.sum())
+    regressors = np.column_stack([np.log(energy / np.maximum(count, 1.0)), np.arange(stretch_count)])
+    regressors -= np.average(regressors, axis=0, weights=energy)
+    weights = np.sqrt(energy / energy.max())
+    changes = by_stretch / energy - amplitude
+    slope = np.linalg.lstsq(regressors * weights[:, None], changes * weights, rcond=None)[0][0]
+    largest = abs(1.0 + amplitude) / 2.0
+    left = by_stretch - energy * (amplitude + np.clip(slope, -largest, largest) * regressors[:, 0])
+    spread = np.sqrt(stretch_count / (stretch_count - 2) * (left @ left))
+    return float(students_t.ppf(0.975, stretch_count - 2) * spread / energy.sum())
 
 
 def time_deviations(fit: Fit, accepted: Sequence[Hypothesis]) -> tuple[float, ...]:

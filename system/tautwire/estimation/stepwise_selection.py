@@ -280,7 +280,7 @@ class _StepwiseSelection:
         return False
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
-        """The score to hold against alternatives: beside a disturbance today's fit with the evidence of their round."""
+        """The score to hold against alternatives: beside a disturbance the present fit by its round."""
         known = self.complete_rounds.get((tuple(others), None), []) if self.context.fitter.has_disturbance else []
         return next((replace(each, fit=score.fit) for each in known if each.hypothesis == score.hypothesis), score)
 
