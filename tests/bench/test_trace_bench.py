@@ -183,6 +183,7 @@ def test_any_name_is_wrong_where_no_listed_effect_hides() -> None:
     for kind in ("empty", "unlisted"):
         case = case_of(kind)
         assert outcome(case, answer(case, "damping")) == "wrong"
+    assert outcome(case_of("unlisted"), answer(case_of("unlisted"), "damping", verdict="discovered")) == "wrong"
     assert outcome(case, Line(case.key, "f", "c", failure="Traceback")) == "failed"
 
 

@@ -84,7 +84,7 @@ def outcome(case: Case, line: Line) -> Outcome:
     if line.verdict == "none":
         return "right" if case.kind == "empty" else "missed"
     if case.kind == "unlisted":
-        return "right"
+        return "right" if {effect.name for effect in line.effects} <= _minor(line) else "wrong"
     return "alarm" if case.kind == "empty" else "abstained"
 
 
