@@ -228,8 +228,8 @@ class SizePolicy:
     min_share_elsewhere: float = 0.1
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
-    # Half-width of an effect's amplitude over stretches, relative to it, above which it is none: a tank that fills was
-    # a payload with 0.33 to 0.47, effects of the list had 0.15 at most; each on a dozen lifelike recordings or fewer.
+    # Half-width of an effect's amplitude over stretches, relative to it, above which it is none: two tanks that fill
+    # were payloads with 0.37 and 0.39; drag, linear in speed, had 0.03 to 0.12 on three lifelike recordings.
     max_amplitude_spread: float = 0.3
     # Standard deviation of a time constant, relative to it, above which no delay of the effect shows. A rope that
     # stiffens with its tension was a relaxation with 0.4 to 1.2; effects of the list had 0.2 at most.

@@ -269,18 +269,18 @@ class _StepwiseSelection:
         Its score may be of a round whose disturbance had to make up for both; here each has its own. One with fewer
         parameters may explain less by what the tested one's form may leave.
         """
-        before = replace(self, evidences=dict(self.evidences), forward_evidences=dict(self.forward_evidences))
-        log_likelihood = self._validation_log_likelihood()
+        before = self.context, self.accepted, self.current, dict(self.evidences), dict(self.forward_evidences)
+        has_disturbance = self.context.fitter.has_disturbance
+        log_likelihood = self._validation_log_likelihood() if has_disturbance else -np.inf
         self._accept_beside(others, best)
         max_loss = self.context.policy.selection.tie(best.evidence, best.parameter_count < len(tested.form))
-        if not self.context.fitter.has_disturbance or log_likelihood - self._validation_log_likelihood() <= max_loss:
+        if not has_disturbance or log_likelihood - self._validation_log_likelihood() <= max_loss:
             return True
-        self.context, self.accepted, self.current = before.context, before.accepted, before.current
-        self.forward_evidences, self.evidences = before.forward_evidences, before.evidences
+        self.context, self.accepted, self.current, self.evidences, self.forward_evidences = before
         return False
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
-        """The score to hold against alternatives: beside a disturbance the present fit by its round."""
+        """The score to hold against alternatives; beside a disturbance with the evidence of their round."""
         known = self.complete_rounds.get((tuple(others), None), []) if self.context.fitter.has_disturbance else []
         return next((replace(each, fit=score.fit) for each in known if each.hypothesis == score.hypothesis), score)
 
