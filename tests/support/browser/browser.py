@@ -147,9 +147,14 @@ class Browser:
         """The file that a script of the page makes the browser save in an empty folder."""
         self._command("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
         self.run(script)
+        # Chromium holds the name with an empty file until the written one is moved there.
         unfinished = (".crdownload", ".tmp")
         return self.wait(
-            lambda: [p for p in folder.iterdir() if p.suffix not in unfinished and p.name[0] != "."],
+            lambda: [
+                path
+                for path in folder.iterdir()
+                if path.suffix not in unfinished and path.name[0] != "." and path.stat().st_size
+            ],
             "a file to be saved",
         )[0]
 
