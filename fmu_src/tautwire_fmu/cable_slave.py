@@ -81,7 +81,9 @@ class Cable(Slave):
             gravity=gravity,
             swivel_axis=self.swivel_axis,
         )
+        declared_constants = law.with_start_cell_tension(REAL, declared_constants, self.effects, start_route.chord)
         self.constants, self.effects = law.fold_constant_effects(REAL, declared_constants, self.effects)
+        self.moves_states = stages.moves_states(REAL, self.effects) > 0.0
         if not self.started:
             state = law.start_state(self.constants, self.effects)
             self.real[FIRST_STATE : self.state_end] = _flat_state(state)
@@ -98,7 +100,7 @@ class Cable(Slave):
             )
         else:
             line = self._span(middle_motion)
-            if len(state) == 2:
+            if not self.moves_states:
                 middle_state, end_state = self._runge_kutta_step(state, step, inputs_at_end, middle_motion, line)
             else:
                 middle_state, end_state = self._adaptive_step(state, step, inputs_at_end)

@@ -36,6 +36,8 @@ def setting_name(setting: Dict[str, Any]) -> str:
 def effects_from_resource(data: Dict[str, Any]) -> Tuple[Effect, ...]:
     """Effects that act on a component, by its resource: those switched on, then its formulas if it has any."""
     listed_effects = [BY_NAME[setting["name"]] for setting in data["effects"]]
+    if "law" not in data:
+        listed_effects = [effect.on_platform() for effect in listed_effects]
     return (*listed_effects, formula_effect(data["formulas"])) if data.get("formulas") else tuple(listed_effects)
 
 

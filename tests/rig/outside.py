@@ -57,27 +57,30 @@ class RotationalDrag(Effect):
 class SensorDelay(Effect):
     """Outputs that come `seconds` late; `outputs` is "tension", "position" or "all".
 
-    With form "lag" load cells follow as dy/dt = (T - y)/seconds instead.
+    With form "lag" load cells follow as dy/dt = (T - y)/seconds instead, or in ``order`` such stages, alike, that take
+    as long together.
     """
 
     seconds: float
     outputs: str = "tension"
     form: str = "delay"
+    order: int = 1
 
     def size(self) -> int:
-        """What each lagging load cell shows."""
-        return self.rig.robot.count if self.form == "lag" else 0
+        """What each stage of each lagging load cell shows."""
+        return self.order * self.rig.robot.count if self.form == "lag" else 0
 
     def begin(self) -> Vector:
         """The start tensions."""
-        return self.rig.start_tension.copy() if self.form == "lag" else np.zeros(0)
+        return np.tile(self.rig.start_tension, self.order) if self.form == "lag" else np.zeros(0)
 
     def transmit(self, moment: Moment) -> None:
         """Show what lags."""
         if self.form == "lag":
-            shown = moment.state[self.part]
-            moment.rates[self.part] = (moment.cell - shown) / self.seconds
-            moment.cell = np.where(self.on, shown, moment.cell)
+            shown = moment.state[self.part].reshape(self.order, -1)
+            before = np.vstack([moment.cell, shown[:-1]])
+            moment.rates[self.part] = ((before - shown) * self.order / self.seconds).ravel()
+            moment.cell = np.where(self.on, shown[-1], moment.cell)
 
     def delay(self) -> dict[str, Vector]:
         """Lag of each output, s."""

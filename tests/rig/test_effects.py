@@ -62,6 +62,7 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
     ("drag", {"drag_area": 5.0, "exponent": 1.0}, {"drag_area": 0.0, "exponent": 1.0}),
     ("slack", {"softness": 500.0, "form": "root"}, {"softness": 1e-3, "form": "root"}),
     ("sensor_delay", {"seconds": 0.02, "form": "lag"}, {"seconds": 1e-6, "form": "delay"}),
+    ("sensor_delay", {"seconds": 0.02, "form": "lag", "order": 2}, {"seconds": 1e-6, "form": "delay"}),
     ("sensor_gain", {"gain": 1.0, "bend": 0.05}, {"gain": 1.0, "bend": 0.0}),
     (
         "unlisted_bungee",

@@ -78,6 +78,7 @@ CASES = (
     ),
     Case("sensor_delay", {"seconds": 0.023}, {"tension_delay": 0.023}),
     Case("sensor_delay", {"seconds": 0.05, "outputs": "position"}, {"position_delay": 0.05}),
+    Case("sensor_delay", {"seconds": 0.05, "form": "lag"}, {"tension_time_constant": 0.05}),
 )
 # On platforms that turn: those that only they can have, and those whose forces act at a point of theirs.
 RIGID_CASES = (

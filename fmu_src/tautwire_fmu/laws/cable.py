@@ -52,7 +52,8 @@ class CableConstants(NamedTuple):
     """Constants of a cable by the robot file, and its static start; SI units.
 
     ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.effect_stages.route` at the start,
-    ``swivel_axis`` is the unit vector that it takes.
+    ``swivel_axis`` is the unit vector that it takes. ``start_cell_tension`` is that at the load cell then, where its
+    low-pass filter begins; see :func:`with_start_cell_tension`.
     """
 
     law: TensionLaw
@@ -65,6 +66,7 @@ class CableConstants(NamedTuple):
     start_direction: Vector
     gravity: Any
     swivel_axis: Vector = stages.VERTICAL
+    start_cell_tension: Any = 0.0
 
 
 class CableState(NamedTuple):
@@ -115,8 +117,8 @@ class CableMotion(NamedTuple):
 class CableOutputs(NamedTuple):
     """Outputs of a cable: tension in N, force on the platform in N, lengths in m.
 
-    ``tension`` is that at the load cell, without its lag; ``span_tension`` that of the free span; ``pull`` the value of
-    the tension law, negative where the cable hangs slack.
+    ``tension`` is that at the load cell, behind its low-pass filter and without its delay; ``span_tension`` that of the
+    free span; ``pull`` the value of the tension law, negative where the cable hangs slack.
     """
 
     tension: Any
@@ -147,6 +149,22 @@ def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> Cable
         wound_length=0.0,
         effects=tuple((0.0,) * len(active.effect.states) for active in effects),
     )
+
+
+def with_start_cell_tension(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], chord: Any
+) -> CableConstants:
+    """The constants of a cable with the tension at its load cell at the start, where that has a low-pass filter.
+
+    ``chord`` is the straight distance then, in m.
+    """
+    if not stages.has_low_pass(effects):
+        return cable
+    line = Span(cable.start_direction, cable.start_length, chord, 0.0, (0.0, 0.0, 0.0))
+    at_rest = start_state(cable, effects)
+    motion = cable_motion(m, cable, effects, at_rest, line, 0.0)
+    _, tension = _span_tension(m, cable, effects, at_rest, motion)
+    return cable._replace(start_cell_tension=_end_forces(m, cable, effects, motion, tension)[1])
 
 
 def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Sequence[ActiveEffect] = ()) -> Span:
@@ -202,13 +220,19 @@ def state_rates(
     motion: CableMotion,
 ) -> CableState:
     """Time derivative of the state, in the shape of the state."""
+    effect_rates = tuple(
+        () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, motion)
+        for active, own in zip(effects, state.effects)
+    )
+    if stages.has_low_pass(effects):
+        _, tension = _span_tension(m, cable, effects, state, motion)
+        _, cell_tension = _end_forces(m, cable, effects, motion, tension)
+        _, filter_rates = _filtered(m, cable, effects, state, cell_tension)
+        effect_rates = tuple(own or filtered for own, filtered in zip(effect_rates, filter_rates))
     return CableState(
         unstrained_length=cable.law.unstrained_length_rate(m, motion.rope_speed, motion.arc, state.unstrained_length),
         wound_length=motion.rope_speed,
-        effects=tuple(
-            () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, motion)
-            for active, own in zip(effects, state.effects)
-        ),
+        effects=effect_rates,
     )
 
 
@@ -225,27 +249,53 @@ def cable_outputs(
     law the winch has taken up strained rope, and the two differ by that stretch.
     """
     line = motion.line
+    pull, tension = _span_tension(m, cable, effects, state, motion)
     if effects:
-        damping = stages.viscosity(m, effects, cable)
-        law_tension = motion.elastic_tension + cable.area * (damping * motion.strain_rate)
-        law_tension = law_tension + stages.added_tension(m, effects, state.effects, cable, motion)
-        tension = stages.carried_tension(m, effects, cable, law_tension)
-        log_platform_ratio, log_cell_ratio = stages.transmission(m, effects, motion)
-        end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
-        force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
-        force = add(force, stages.lateral_force(m, effects, line))
-        cell_tension = (tension + end_tension) * m.exp(log_cell_ratio)
+        force, cell_tension = _end_forces(m, cable, effects, motion, tension)
+        if stages.has_low_pass(effects):
+            cell_tension, _ = _filtered(m, cable, effects, state, cell_tension)
         measured_tension = cell_tension * stages.sensor_gains(m, effects)[0] + stages.sensor_offsets(m, effects)[0]
     else:
-        law_tension = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
-        measured_tension = tension = m.maximum(law_tension, 0.0)
+        measured_tension = tension
         force = scale(tension, line.direction)
     return CableOutputs(
         tension=measured_tension,
         span_tension=tension,
-        pull=law_tension,
+        pull=pull,
         force=force,
         length=line.length,
         elongation=line.length - (cable.start_length - state.wound_length),
         strain=motion.strain,
     )
+
+
+def _span_tension(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], state: CableState, motion: CableMotion
+) -> Tuple[Any, Any]:
+    """Value of the tension law, and the tension of the free span, in N."""
+    if not effects:
+        pull = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
+        return pull, m.maximum(pull, 0.0)
+    damping = stages.viscosity(m, effects, cable)
+    pull = motion.elastic_tension + cable.area * (damping * motion.strain_rate)
+    pull = pull + stages.added_tension(m, effects, state.effects, cable, motion)
+    return pull, stages.carried_tension(m, effects, cable, pull)
+
+
+def _end_forces(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], motion: CableMotion, tension: Any
+) -> Tuple[Vector, Any]:
+    """Forces of a span under a tension on the platform, and at the load cell, in N."""
+    line = motion.line
+    log_platform_ratio, log_cell_ratio = stages.transmission(m, effects, motion)
+    end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
+    force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
+    return add(force, stages.lateral_force(m, effects, line)), (tension + end_tension) * m.exp(log_cell_ratio)
+
+
+def _filtered(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], state: CableState, cell_tension: Any
+) -> Tuple[Any, Tuple[Tuple[Any, ...], ...]]:
+    """Tension behind the load cell's low-pass filters, and the rates of their states."""
+    reference = (cable.start_cell_tension, cable.modulus * cable.area)
+    return stages.low_pass(m, effects, state.effects, cell_tension, reference)

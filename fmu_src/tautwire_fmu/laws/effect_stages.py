@@ -1,6 +1,6 @@
 """Combined contributions of a cable's effects, stage by stage."""
 
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, List, NamedTuple, Sequence, Tuple
 
 from .effects import ActiveEffect
 from .mathematics import Mathematics
@@ -8,6 +8,8 @@ from .rotation import quaternion_to_vertical, rotate, rotate_back
 from .vectors import Vector, add, norm, scale, subtract
 
 VERTICAL = (0.0, 0.0, 1.0)
+# Shortest time constant of a filter, in s; shorter ones act as this one.
+SHORTEST_FILTER = 1e-3
 
 Effects = Sequence[ActiveEffect]
 States = Sequence[Tuple[Any, ...]]
@@ -178,6 +180,41 @@ def sensor_offsets(m: Mathematics, effects: Effects) -> Tuple[Any, Vector]:
             tension = tension + first
             position = add(position, second)
     return tension, position
+
+
+def has_low_pass(effects: Effects) -> bool:
+    """Whether a load cell has a low-pass filter."""
+    return any(active.effect.low_pass is not None for active in effects)
+
+
+def moves_states(m: Mathematics, effects: Effects) -> Any:
+    """Positive where an effect has a state that moves; that of a load cell without a filter rests."""
+    if any(active.effect.state_rates is not None for active in effects):
+        return 1.0
+    return sum(active.effect.low_pass(m, active.values) for active in effects if active.effect.low_pass is not None)
+
+
+def low_pass(
+    m: Mathematics, effects: Effects, states: States, tension: Any, reference: Tuple[Any, Any]
+) -> Tuple[Any, Tuple[Tuple[Any, ...], ...]]:
+    """Tension that load cells show behind low-pass filters of first order, in N, and the rates of the filters' states.
+
+    ``tension`` is that at the cell. A filter's state is what it shows beside the tension at the start, over the rope's
+    modulus times area: these two are the ``reference``.
+    """
+    start_tension, rigidity = reference
+    rates: List[Tuple[Any, ...]] = []
+    for active, effect_states in zip(effects, states):
+        if active.effect.low_pass is None:
+            rates.append(())
+            continue
+        time = active.effect.low_pass(m, active.values)
+        shown = start_tension + rigidity * effect_states[0]
+        # Without a filter the state rests; a time constant of zero must not divide.
+        rate = (tension - shown) / (rigidity * m.maximum(time, SHORTEST_FILTER))
+        rates.append((m.where(time, rate, 0.0),))
+        tension = m.where(time, shown, tension)
+    return tension, tuple(rates)
 
 
 def sensor_delays(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:

@@ -42,7 +42,9 @@ def attachment_settings(robot: Robot, cable: int) -> tuple[EffectSetting, ...]:
 
 def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
     """The effects of :func:`platform_settings` and the formulas on the platform, as the laws take them."""
-    return (*map(active_effect, platform_settings(robot)), *_formula_effects(robot.formulas_on()))
+    listed = [active_effect(setting) for setting in platform_settings(robot)]
+    on_platform = [active._replace(effect=active.effect.on_platform()) for active in listed]
+    return (*on_platform, *_formula_effects(robot.formulas_on()))
 
 
 def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.cable import LAWS, CableConstants
+from tautwire_fmu.laws.cable import LAWS, CableConstants, with_start_cell_tension
 from tautwire_fmu.laws.effects import ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
@@ -90,21 +90,21 @@ def cable_components(
 ) -> tuple[CableComponent, ...]:
     """The cables of a robot that rests at a pose (m, unit quaternion) under tensions (n,) in N."""
     routes = cable_routes(mathematics, robot, position, orientation)
-    return tuple(
-        CableComponent(
-            constants=CableConstants(
-                law=LAWS[cable.law],
-                anchor=cable.anchor,
-                modulus=cable.modulus,
-                area=cable.area,
-                damping=cable.damping,
-                start_length=route.length,
-                start_tension=tension,
-                start_direction=route.direction,
-                gravity=robot.gravity,
-                swivel_axis=cable.swivel_axis,
-            ),
-            effects=cable_effects(robot, index),
+    components = []
+    for index, (cable, route, tension) in enumerate(zip(robot.cables, routes, tensions, strict=True), start=1):
+        constants = CableConstants(
+            law=LAWS[cable.law],
+            anchor=cable.anchor,
+            modulus=cable.modulus,
+            area=cable.area,
+            damping=cable.damping,
+            start_length=route.length,
+            start_tension=tension,
+            start_direction=route.direction,
+            gravity=robot.gravity,
+            swivel_axis=cable.swivel_axis,
         )
-        for index, (cable, route, tension) in enumerate(zip(robot.cables, routes, tensions, strict=True), start=1)
-    )
+        effects = cable_effects(robot, index)
+        constants = with_start_cell_tension(mathematics, constants, effects, route.chord)
+        components.append(CableComponent(constants, effects))
+    return tuple(components)

@@ -131,7 +131,9 @@ def minimal_equations(assembly: RobotAssembly, variables: MechanicalVariables) -
         rows = [*range(mechanical_count), *(mechanical_count + index for index in indices)]
         return [effect_states[index] for index in indices], replace(equations, rates=equations.rates[rows])
 
-    effect_states, equations = select([i for i, each in enumerate(effect_states) if each not in effect_states[:i]])
+    # By identity: symbols have no truth value where an effect is listed twice.
+    seen = [any(each is other for other in effect_states[:i]) for i, each in enumerate(effect_states)]
+    effect_states, equations = select([i for i, is_repeated in enumerate(seen) if not is_repeated])
     states = casadi.vertcat(variables.states, *(each.symbol for each in effect_states))
     return select(_relevant_effect_states(states, mechanical_count, equations))
 

@@ -176,6 +176,7 @@ def held_statics(cables: Sequence[CableComponent], length_shifts: SX, others: Se
             start_length=hold(f"start_length_{number}", constants.start_length),
             start_tension=hold(f"start_tension_{number}", constants.start_tension),
             start_direction=(x, y, z),
+            start_cell_tension=hold(f"start_cell_tension_{number}", constants.start_cell_tension),
         )
         components.append(replace(component, constants=held_constants))
     shifts = casadi.vertcat(*(hold("length_shift", shift) for shift in casadi.vertsplit(length_shifts)))

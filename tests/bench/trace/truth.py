@@ -38,6 +38,8 @@ def law_values(name: str, rig: Mapping[str, Any]) -> dict[str, float]:
         values |= {f"wind_{axis}": speed for axis, speed in zip("xyz", values.pop("wind"), strict=True)}
     if name == "sensor_offset":
         return _offsets(values)
+    if name == "sensor_delay" and values.pop("form", "delay") == "lag":
+        return {"tension_time_constant": float(values["seconds"])}
     if name in ("sensor_gain", "sensor_delay"):
         new = NEW_NAMES[name, values.pop("outputs", "tension")]
         values = {new[key]: value for key, value in values.items()}

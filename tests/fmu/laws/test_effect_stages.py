@@ -102,6 +102,24 @@ def test_gains_multiply_and_offsets_and_delays_add() -> None:
     assert stages.sensor_delays(REAL, late) == pytest.approx((0.3, 0.4))
 
 
+def test_low_pass_filters_in_series_each_follow_what_the_one_before_shows() -> None:
+    """With E A = 2000 N, 0.1 of it above 700 N shows 900 N; rates are those of dy/dt = (T - y) / tau over E A."""
+    in_series = (active("sensor_delay", tension_time_constant=0.5), active("sensor_delay", tension_time_constant=0.2))
+    shown, rates = stages.low_pass(REAL, in_series, ((0.1,), (-0.2,)), 1000.0, (700.0, 2000.0))
+    assert shown == pytest.approx(300.0)
+    assert rates == (pytest.approx((0.1,)), pytest.approx((1.5,)))
+    assert stages.has_low_pass(in_series)
+    assert stages.moves_states(REAL, in_series) > 0.0
+
+
+def test_a_load_cell_without_a_time_constant_shows_the_tension_at_once_and_moves_no_state() -> None:
+    late = (active("sensor_delay", tension_delay=0.1),)
+    assert stages.low_pass(REAL, late, ((0.0,),), 1000.0, (700.0, 2000.0)) == (1000.0, ((0.0,),))
+    assert stages.moves_states(REAL, late) == 0.0
+    assert stages.moves_states(REAL, (active("slack", softness=100.0),)) == 0.0
+    assert stages.moves_states(REAL, (*late, active("creep", compliance=1e-12))) > 0.0
+
+
 def test_a_soft_rope_keeps_its_start_tension_and_never_pushes() -> None:
     cable = type("Cable", (), {"start_tension": 250.0})
     soft = (active("slack", softness=100.0),)

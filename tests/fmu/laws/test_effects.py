@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire_fmu.effect_variables import effects_from_resource
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.cable import (
     LAWS,
@@ -96,7 +97,17 @@ def test_its_description_is_complete(effect: Effect) -> None:
         assert parameter.minimum <= parameter.start <= parameter.maximum
         assert parameter.neutral is None or parameter.minimum <= parameter.neutral <= parameter.maximum
     assert all(state.unit in UNITS and state.scale > 0.0 for state in effect.states)
-    assert bool(effect.states) == (effect.state_rates is not None)
+    assert bool(effect.states) == (effect.state_rates is not None or effect.low_pass is not None)
+
+
+def test_filters_of_load_cells_have_their_state_in_cables_and_none_on_the_platform() -> None:
+    switched_on = {"effects": [{"name": "sensor_delay"}]}
+    (in_cable,) = effects_from_resource({"law": "linear", **switched_on})
+    (on_platform,) = effects_from_resource(switched_on)
+    assert len(in_cable.states) == 1
+    assert on_platform.states == ()
+    assert on_platform.low_pass is None
+    assert on_platform.delay is in_cable.delay
 
 
 @pytest.mark.parametrize("effect", ALL, ids=lambda e: e.name)

@@ -207,6 +207,7 @@ RIGHT = (
         60.0,
         lambda s, w: {"force": w.sign * s * w.survey.tension_offset, "cables": [w.cable]},
     ),
+    Hidden("sensor_delay-low-pass", "sensor_delay", "right", 5e-3, 0.2, lambda s, w: {"seconds": s, "form": "lag"}),
 )
 
 WRONG = (
@@ -267,7 +268,14 @@ WRONG = (
     Hidden(
         "slack-root", "slack", "wrong", 0.2, 1.0, lambda s, w: {"softness": s * w.design.usual_tension, "form": "root"}
     ),
-    Hidden("sensor_delay-lag", "sensor_delay", "wrong", 5e-3, 0.2, lambda s, w: {"seconds": s, "form": "lag"}),
+    Hidden(
+        "sensor_delay-lag",
+        "sensor_delay",
+        "wrong",
+        5e-3,
+        0.2,
+        lambda s, w: {"seconds": s, "form": "lag", "order": 2},
+    ),
     Hidden(
         "sensor_gain-bent",
         "sensor_gain",

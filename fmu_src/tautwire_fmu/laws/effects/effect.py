@@ -29,7 +29,7 @@ class Parameter(NamedTuple):
 
     @property
     def is_time_constant(self) -> bool:
-        """Whether it is the time constant of a state, which is never zero; a delay is none."""
+        """Whether it is the time constant of a state that is always there; a delay, or a sensor's filter, is none."""
         return self.unit == "s" and self.minimum > 0.0
 
 
@@ -80,15 +80,17 @@ class Effect(NamedTuple):
     ``gain``                                                            factors of measured tension and position
     ``offset``                                                          N and m, added to these: a number, a vector
     ``delay``                                                           s, of measured tension and position
+    ``low_pass``                                                        s, time constant of the load cell's filter
     ==================== ============================================== ==============================================
 
     ``attachment``, ``mass_position`` and ``centre_of_mass`` are in the platform's frame, other vectors in the world's.
     ``line`` is a :class:`tautwire_fmu.laws.cable.Span`, but in ``path``.
 
     ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order). ``state_rates`` gives a
-    tuple, one rate a state, from ``m, values, states, cable, motion``. ``forms`` are the sets of parameters that a fit
-    estimates together; the others stay neutral. One that is not ``is_tried_on_point_masses`` would take the name of
-    something else there.
+    tuple, one rate a state, from ``m, values, states, cable, motion``; an effect with ``low_pass`` has one state
+    instead, that of the filter, on cables alone; see :func:`tautwire_fmu.laws.effect_stages.low_pass`. ``forms`` are
+    the sets of parameters that a fit estimates together; the others stay neutral. One that is not
+    ``is_tried_on_point_masses`` would take the name of something else there.
     """
 
     name: str
@@ -124,6 +126,11 @@ class Effect(NamedTuple):
     gain: Optional[Callable[..., Any]] = None
     offset: Optional[Callable[..., Any]] = None
     delay: Optional[Callable[..., Any]] = None
+    low_pass: Optional[Callable[..., Any]] = None
+
+    def on_platform(self) -> "Effect":
+        """The effect as it acts on the platform and its sensors, where load cells have no filters."""
+        return self if self.low_pass is None else self._replace(states=(), low_pass=None)
 
     @property
     def only_sets_constants(self) -> bool:

@@ -15,13 +15,14 @@ from .interpolation_functions import MOTION_SIZE
 from .traced_functions import Columns, TracedFunction, rates_along, trace_function
 
 DECLARED_PARAMETERS = 11
-START_SIZE = 5
+START_SIZE = 7
 
 
 def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
     """``cable_start``, ``cable_rates`` and ``cable_outputs`` of the law and the effects of a cable's resource.
 
-    ``start`` are what follows from the parameters: length, direction and sensor delay.
+    ``start`` are what follows from the parameters: length, direction, sensor delay, whether effects' states
+    move, and tension at the load cell behind a filter.
     """
     effects = effects_from_resource(dict(data))
     states = 2 + sum(len(effect.states) for effect in effects)
@@ -44,12 +45,19 @@ class _Cable:
         self.swivel_axis = swivel_axis
 
     def start(self, m: Mathematics, columns: Columns) -> Columns:
-        """Length and direction at the start and the load cell's delay, and the states there."""
+        """What follows from the parameters, see :func:`cable_functions`, and the states at the start."""
         parameters = columns["parameters"]
         effects = active_effects(self.listed_effects, parameters[DECLARED_PARAMETERS:])
         route = stages.route(m, effects, parameters[0:3], parameters[3:6], self.swivel_axis)
-        start = [route.length, *route.direction, stages.sensor_delays(m, effects)[0]]
+        start = [
+            route.length,
+            *route.direction,
+            stages.sensor_delays(m, effects)[0],
+            stages.moves_states(m, effects),
+            0.0,
+        ]
         constants, effects = self._constants(m, parameters, start)
+        start[-1] = law.with_start_cell_tension(m, constants, effects, route.chord).start_cell_tension
         return {"start": start, "states": _flat_state(law.start_state(constants, effects))}
 
     def rates(self, m: Mathematics, columns: Columns) -> Columns:
@@ -90,6 +98,7 @@ class _Cable:
             start_direction=start[1:4],
             gravity=gravity,
             swivel_axis=self.swivel_axis,
+            start_cell_tension=start[6],
         )
         effects = active_effects(self.listed_effects, parameters[DECLARED_PARAMETERS:])
         return law.fold_constant_effects(m, declared, effects)

@@ -8,6 +8,7 @@
 #define TENSION_RATE 33
 #define MIDDLE_FORCE 34
 #define TENSION_DELAY 4
+#define MOVES_STATES 5
 #define SHOWN_TENSION 3
 #define SHOWN_TENSION_RATE 3
 
@@ -49,7 +50,8 @@ static int shown_at(const Slave *slave, const double *motion, const double *stat
 
 #if STATE_COUNT > 2
 #include "dormand_prince.c"
-#else
+#endif
+
 /* States in the middle and at the end by the classical Runge-Kutta method. */
 static int runge_kutta_step(const Slave *slave, double step, int at_end, const double *state, double *middle,
                             double *end) {
@@ -68,7 +70,14 @@ static int runge_kutta_step(const Slave *slave, double step, int at_end, const d
   }
   return 1;
 }
+
+/* States of effects that rest need no adaptive steps. */
+static int integrate(Slave *slave, double step, int at_end, const double *start, double *middle, double *end) {
+#if STATE_COUNT > 2
+  if (slave->start[MOVES_STATES] > 0.0) return integrate_dormand_prince(slave, step, at_end, start, middle, end);
 #endif
+  return runge_kutta_step(slave, step, at_end, start, middle, end);
+}
 
 static int append_tension(Slave *slave, const double *times, const double *first, const double *last) {
   double segment[SEGMENT_SIZE];
@@ -101,11 +110,7 @@ static int advance(Slave *slave, double step, int at_end) {
   double middle_motion[MOTION_SIZE], shown[8], rates[4];
   const double *states[3];
   memcpy(start, real + FIRST_STATE, sizeof start);
-#if STATE_COUNT > 2
-  if (!integrate_dormand_prince(slave, step, at_end, start, middle, end)) return 0;
-#else
-  if (!runge_kutta_step(slave, step, at_end, start, middle, end)) return 0;
-#endif
+  if (!integrate(slave, step, at_end, start, middle, end)) return 0;
   if (!motion_at(slave, step, 0.5, at_end, middle_motion)) return 0;
   if (!shown_at(slave, middle_motion, middle, shown, rates)) return 0;
   states[0] = start;
