@@ -174,3 +174,12 @@ def test_without_a_disturbance_an_effect_of_little_evidence_is_what_the_form_of_
     assert word == "effects"
     assert ("The model lacks friction; with it and sensor_gain, too small to matter" in sentence) == is_small
     assert ("friction and sensor_gain; with them, the residual" in sentence) == (not is_small)
+
+
+def test_effects_that_nearly_cancel_each_other_get_no_name() -> None:
+    of = shares(0.03, 44.0, payload=(0.97, 170.0), sensor_offset=(0.97, 170.0))
+    assert verdict(of, "payload", "sensor_offset")[0] == "effects"
+    word, sentence = verdict(replace(of, sizes=(415.0, 380.0)), "payload", "sensor_offset")
+    assert word == "unexplained"
+    assert "would go to payload and sensor_offset" in sentence
+    assert sentence.endswith(", which would nearly cancel each other.")

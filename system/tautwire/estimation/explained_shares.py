@@ -11,7 +11,8 @@ a value each is one effect.
 
 An effect is the same from beginning to end; what is only like it now and then would need another size on each stretch.
 One whose state settles has a time constant that shows; without, it is only like another effect: a relaxation that takes
-far longer than the motion is a modulus, a far faster one damping. A slow drift stays a drift.
+far longer than the motion is a modulus, a far faster one damping. A slow drift stays a drift. Effects of which each
+changes far more than is missed nearly cancel each other, and what they leave shows none of them.
 """
 
 from __future__ import annotations
@@ -71,9 +72,9 @@ class ExplainedShares:
         """Indices of the effects that matter, the largest first.
 
         Their shares are worth a name, and more than the form of the largest may leave; their sizes are beyond noise,
-        and about the same on all stretches; their time constants show.
+        not far beyond what is missed, and about the same on all stretches; their time constants show.
         """
-        shown = set(self.steady(policy)) & set(self.timed(policy))
+        shown = set(self.steady(policy)) & set(self.timed(policy)) & set(self.uncancelled(policy))
         ranked = sorted(shown, key=lambda index: (-self.effects[index], index))
         least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))
         return [i for i in ranked if self.effects[i] >= least and self.sizes[i] >= policy.min_size]
@@ -87,6 +88,11 @@ class ExplainedShares:
     def steady(self, policy: SizePolicy) -> list[int]:
         """Indices of the effects that have about the same size on all stretches."""
         return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]
+
+    def uncancelled(self, policy: SizePolicy) -> list[int]:
+        """Indices of the effects that change no more than others could nearly cancel."""
+        largest = policy.max_size_to_missed * self.size_missed
+        return [index for index, size in enumerate(self.sizes) if size <= largest]
 
     def timed(self, policy: SizePolicy) -> list[int]:
         """Indices of the effects whose time constants the recordings determine, or that have none."""

@@ -164,7 +164,8 @@ def select_beside_disturbance(state: Identification) -> Identification:
     shares = beside.shares
     if shares is None or not beside.selection.accepted:
         return state
-    is_form = shares.left <= policy.max_left_share_of_form and shares.size_missed > policy.max_size_of_disturbance
+    is_much = shares.size_missed > policy.max_size_of_disturbance
+    is_form = is_much and shares.left <= policy.max_left_share_of_form and shares.explains(policy)
     has_fewer = not state.effects_hold or len(beside.selection.accepted) < len(state.selection.accepted)
     return beside if is_form and has_fewer else state
 

@@ -95,6 +95,8 @@ def verdict_beside_disturbance(
     varies = ""
     if len(shares.steady(policy)) < len(accepted):
         varies = ", which would have to change from stretch to stretch"
+    elif len(shares.uncancelled(policy)) < len(accepted):
+        varies = ", which would nearly cancel each other"
     elif len(shares.timed(policy)) < len(accepted):
         varies = ", whose time constant these recordings do not determine"
     closest = f" Of it {_per_cent(shares.explained)} would go to {_sum_up(names)}{varies}." if names else ""
