@@ -16,7 +16,7 @@ from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.selection_result import SelectionResult, with_disturbance_beside

@@ -23,9 +23,9 @@ from tautwire.estimation.disturbance_fit import (
 )
 from tautwire.estimation.disturbance_posterior import Evaluation, ParameterBox, Posterior, disturbance_prior, logs_of
 from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.innovation_sensitivities import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise

@@ -11,7 +11,7 @@ from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.grid_search import grid_points, grid_search, misleading_predictions, starts_by_shape
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import PredictedGain, score_test

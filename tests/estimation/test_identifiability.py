@@ -5,11 +5,11 @@ from math import sqrt
 import numpy as np
 import pytest
 
+from tautwire.estimation.effect_sensitivities import SensitivityColumn
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identifiability import analyse_identifiability, separation_nats
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.innovation_sensitivities import SensitivityColumn
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import ScoreStatistics

@@ -6,20 +6,13 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
-from tautwire.errors import InputError
 from tautwire.estimation import input_design, worker_pool
-from tautwire.estimation.input_design import (
-    DesignOptions,
-    ExcitationError,
-    ExcitationLimits,
-    default_limits,
-    design_excitation,
-    effects_by_name,
-)
+from tautwire.estimation.excitation_limits import ExcitationLimits, default_limits
+from tautwire.estimation.input_design import DesignOptions, ExcitationError, design_excitation, effects_by_name
 from tautwire.estimation.multisine import MultisinePath
 from tautwire.robot.pose_trajectory import PoseTrajectory
 from tautwire.robot.reference_simulation import integrate
-from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
+from tests.support.rigid_robots import crane_robot, octahedral_robot
 from tests.support.robots import EXAMPLES, example
 
 THREE = example("three")
@@ -84,16 +77,6 @@ def test_limits_that_no_program_keeps_are_an_error() -> None:
         )
 
 
-def test_limits_not_given_come_from_the_robot() -> None:
-    limits = default_limits(THREE)
-    assert limits.speed == 0.5
-    assert 0.0 < limits.min_tension < limits.max_tension
-    assert default_limits(THREE, 0.2, 0.1).reach == 0.1
-    eight = example("eight")
-    assert eight.tension is not None
-    assert default_limits(eight).min_tension == eight.tension.minimum
-
-
 @pytest.mark.parametrize(
     ("names", "part"), [("damping", "fewer than two"), ("damping,wobble", "'wobble' is not an effect")]
 )
@@ -131,8 +114,3 @@ def test_rotations_stay_within_their_limit_and_shrink_with_the_path() -> None:
     assert 0.02 < np.max(np.abs(turns[0])) <= limits.turn
     assert turns[1] == pytest.approx(0.5 * turns[0])
     assert not np.any(paths[0].angular_velocity(times[[0, -1]]))  # type: ignore[attr-defined]
-
-
-def test_a_platform_on_fewer_cables_is_refused() -> None:
-    with pytest.raises(InputError, match="suspended: has a platform on 4 cables, whose orientation statics decides"):
-        default_limits(suspended_robot(4))

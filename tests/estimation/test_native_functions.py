@@ -1,86 +1,124 @@
-"""Assembly against CasADi's own interpreter, operation by operation, to the last bit."""
+"""Functions over samples against CasADi's own interpreter, to the last bit."""
 
-from collections.abc import Callable
+from dataclasses import replace
 
 import casadi
 import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.estimation.native_functions import (
-    INSTRUCTIONS,
-    LIBRARY_CALLS,
-    CompiledFunction,
-    UntranslatableError,
-    llvm_assembly,
-)
+from tautwire.estimation.integration_steps import Substeps
+from tautwire.estimation.kalman_filter import output_function, preparation_function, slope_function, trajectory_function
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.native_functions import CompiledFunction, by_sample
+from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
+from tests.support.effect_cases import CASES, Case
+from tests.support.memory import TOLD, resident_memory
+from tests.support.recordings import recorded
+from tests.support.robots import example
 
-NUMBERS = (-np.inf, -1e300, -2.5, -1.0, -0.3, -1e-310, -0.0, 0.0, 1e-310, 0.3, 1.0, 2.5, 1e300, np.inf, np.nan)
-PAIRS = np.array([[a, b] for a in NUMBERS for b in NUMBERS]).T
-
-OPERATIONS: dict[int, Callable[[SX, SX], SX]] = {
-    casadi.OP_ADD: lambda a, b: a + b,
-    casadi.OP_SUB: lambda a, b: a - b,
-    casadi.OP_MUL: lambda a, b: a * b,
-    casadi.OP_DIV: lambda a, b: a / b,
-    casadi.OP_NEG: lambda a, b: -a,
-    casadi.OP_SQ: lambda a, b: a * a,
-    casadi.OP_TWICE: lambda a, b: 2.0 * a,
-    casadi.OP_INV: lambda a, b: 1.0 / a,
-    casadi.OP_LT: lambda a, b: a < b,
-    casadi.OP_LE: lambda a, b: a <= b,
-    casadi.OP_EQ: lambda a, b: a == b,
-    casadi.OP_NE: lambda a, b: a != b,
-    casadi.OP_NOT: lambda a, b: casadi.logic_not(a),
-    casadi.OP_IF_ELSE_ZERO: lambda a, b: casadi.if_else(a, b, 0.0),
-    casadi.OP_SIGN: lambda a, b: casadi.sign(a),
-    casadi.OP_EXP: lambda a, b: casadi.exp(a),
-    casadi.OP_LOG: lambda a, b: casadi.log(a),
-    casadi.OP_POW: lambda a, b: a**b,
-    casadi.OP_CONSTPOW: lambda a, b: a**1.7,
-    casadi.OP_SQRT: lambda a, b: casadi.sqrt(a),
-    casadi.OP_SIN: lambda a, b: casadi.sin(a),
-    casadi.OP_COS: lambda a, b: casadi.cos(a),
-    casadi.OP_TAN: lambda a, b: casadi.tan(a),
-    casadi.OP_ASIN: lambda a, b: casadi.asin(a),
-    casadi.OP_ACOS: lambda a, b: casadi.acos(a),
-    casadi.OP_ATAN: lambda a, b: casadi.atan(a),
-    casadi.OP_ATAN2: casadi.atan2,
-    casadi.OP_SINH: lambda a, b: casadi.sinh(a),
-    casadi.OP_COSH: lambda a, b: casadi.cosh(a),
-    casadi.OP_TANH: lambda a, b: casadi.tanh(a),
-    casadi.OP_FABS: lambda a, b: casadi.fabs(a),
-    casadi.OP_FMIN: casadi.fmin,
-    casadi.OP_FMAX: casadi.fmax,
-}
+GENERATOR = np.random.default_rng(1)
 
 
-def test_every_operation_of_the_tables_is_tried_here() -> None:
-    assert {*LIBRARY_CALLS, *INSTRUCTIONS} - {casadi.OP_ASSIGN} == set(OPERATIONS)
+def falling() -> Function:
+    """Carries a state (2) and a matrix (2, 2); takes a step and a constant vector; sparse on purpose."""
+    state, matrix, step, pull = SX.sym("state", 2), SX.sym("matrix", 2, 2), SX.sym("step"), SX.sym("pull", 2)
+    turned = casadi.vertcat(casadi.horzcat(1.0, step), casadi.horzcat(SX(1, 1), 1.0))
+    after = casadi.mtimes(turned, state) + step * pull
+    return Function("falling", [state, matrix, step, pull], [after, casadi.mtimes(turned, matrix), turned])
 
 
-@pytest.mark.parametrize("operation", OPERATIONS)
-def test_an_operation_gives_what_casadi_gives(operation: int) -> None:
-    a, b = SX.sym("a"), SX.sym("b")
-    function = Function("one", [a, b], [OPERATIONS[operation](a, b)])
-    used = [function.instruction_id(k) for k in range(function.n_instructions())]
-    assert operation in used
-    ours = CompiledFunction(function)(PAIRS.shape[1], PAIRS[:1], PAIRS[1:])[0].ravel()
-    theirs = np.array(function.map(PAIRS.shape[1])(PAIRS[:1], PAIRS[1:])).ravel()
-    np.testing.assert_array_equal(ours, theirs)
-    # C leaves open which of two zeros is the smaller.
-    if operation not in (casadi.OP_FMIN, casadi.OP_FMAX):
-        np.testing.assert_array_equal(np.signbit(ours[~np.isnan(ours)]), np.signbit(theirs[~np.isnan(theirs)]))
+def test_a_function_is_taken_over_columns() -> None:
+    a, b = SX.sym("a", 2, 3), SX.sym("b", 3)
+    function = Function("product", [a, b], [casadi.mtimes(a, b), casadi.sin(b)])
+    many, vectors = GENERATOR.normal(size=(2, 3 * 7)), GENERATOR.normal(size=(3, 7))
+    for ours, theirs in zip(CompiledFunction(function)(7, many, vectors), function.map(7)(many, vectors), strict=True):
+        np.testing.assert_array_equal(ours, np.array(theirs))
 
 
-def test_constants_keep_all_their_bits() -> None:
-    values = [0.1, -1e-310, np.pi, np.inf, -np.inf, np.nan, 1.0000000000000002]
-    ours = CompiledFunction(Function("constants", [SX.sym("a")], [SX(values)]))(1, np.zeros((1, 1)))[0]
-    np.testing.assert_array_equal(ours.ravel(), values)
+def test_results_are_carried_to_the_next_sample() -> None:
+    state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
+    steps, pull = GENERATOR.normal(size=(1, 5)), GENERATOR.normal(size=(2, 1))
+    ours = CompiledFunction(falling(), carried=2)(5, state, matrix, steps, pull)
+    theirs = falling().mapaccum("run", 5, 2)(state, matrix, steps, np.repeat(pull, 5, axis=1))
+    np.testing.assert_array_equal(ours[0], np.hstack([state, np.array(theirs[0])]))
+    np.testing.assert_array_equal(ours[1], np.hstack([matrix, np.array(theirs[1])]))
+    np.testing.assert_array_equal(ours[2], np.array(theirs[2]))
 
 
-def test_an_operation_that_is_in_no_table_is_told() -> None:
-    a = SX.sym("a")
-    with pytest.raises(UntranslatableError, match="function bell") as told:
-        llvm_assembly(Function("bell", [a], [casadi.erf(a)]))
-    assert told.value.operation == casadi.OP_ERF
+def test_no_samples_give_what_was_carried() -> None:
+    state, matrix = np.ones((2, 1)), np.eye(2)
+    found = CompiledFunction(falling(), carried=2)(0, state, matrix, np.zeros((1, 0)), np.zeros((2, 0)))
+    assert [result.shape for result in found] == [(2, 1), (2, 2), (2, 0)]
+    np.testing.assert_array_equal(found[1], matrix)
+
+
+def test_arguments_of_other_sizes_are_refused() -> None:
+    repeated = CompiledFunction(falling(), carried=2)
+    with pytest.raises(ValueError, match=r"shape \(1, 4\), where \(1, 1\) is one of 5 samples"):
+        repeated(5, np.ones((2, 1)), np.eye(2), np.ones((1, 4)), np.ones((2, 1)))
+
+
+def test_what_is_carried_has_to_fit() -> None:
+    repeated = CompiledFunction(falling(), carried=2)
+    with pytest.raises(ValueError, match=r"shape \(2, 1\), where \(2, 2\) is one of 1 samples"):
+        repeated(5, np.ones((2, 1)), np.ones((2, 1)), np.ones((1, 5)), np.ones((2, 1)))
+    with pytest.raises(ValueError, match="3 results of falling are to be carried"):
+        CompiledFunction(falling(), carried=3)
+
+
+@pytest.mark.parametrize("count", [0, 1, 6])
+def test_what_is_interpreted_is_the_same(count: int) -> None:
+    state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
+    steps, pull = GENERATOR.normal(size=(1, count)), GENERATOR.normal(size=(2, 1))
+    for carried, first in ((2, (state, matrix)), (0, (np.tile(state, count), matrix))):
+        ways = [CompiledFunction(falling(), carried, most)(count, *first, steps, pull) for most in (0, 10_000)]
+        for one, other in zip(*ways, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_results_are_stacked_by_sample() -> None:
+    wide = np.arange(12.0).reshape(2, 6)
+    np.testing.assert_array_equal(by_sample(wide, 3)[1], wide[:, 2:4])
+    assert by_sample(np.zeros((2, 0)), 3).shape == (3, 2, 0)
+    assert by_sample(np.zeros((0, 6)), 3).shape == (3, 0, 2)
+
+
+@pytest.mark.skipif(not TOLD, reason="only Linux tells the memory of a process")
+def test_functions_that_are_kept_take_little_memory() -> None:
+    a = SX.sym("a", 16, 16)
+    function = Function("cube", [a], [casadi.mtimes(a, casadi.mtimes(a, a))])
+    kept = [CompiledFunction(function)]
+    before, _ = resident_memory()
+    kept += [CompiledFunction(function) for _ in range(10)]
+    after, _ = resident_memory()
+    # 17,000 instructions, of some twenty bytes each.
+    assert after - before < 10 * 3.0
+    assert len(kept) == 11
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: Case) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise, count = estimate_noise(robot, recording), 50
+    model = symbolic_model(
+        replace(robot, effects=(case.setting(robot),)), [FreeParameter(0, name) for name in case.law]
+    )
+    theta = np.array(list(case.law.values()))[:, None]
+    start = np.array(Function("start", [model.parameters], [model.start])(theta))
+    speeds = (recording.winch_speed[:count].T, recording.winch_speed[1 : count + 1].T)
+    step = np.diff(recording.time[: count + 1])[None, :]
+    substeps = Substeps(5, 1)
+    (constants,) = preparation_function(model, noise).call([start, theta, 0.02, []])[:1]
+    moving, zero = (start, np.array(constants)), np.zeros((1, 1))
+    for function, columns in (
+        (output_function(model, 3, noise), (start, theta, np.zeros((6, 1)), *speeds, step, np.zeros((0, 1)))),
+        (preparation_function(model, noise), (start, theta, step, np.zeros((0, 1)))),
+        (trajectory_function(model, 3, noise, substeps), (*moving, *speeds, step, zero)),
+        (slope_function(model, 3, noise, substeps), (*moving, *speeds, zero)),
+    ):
+        arguments = [np.tile(a, count) if a.shape[1] == 1 else a for a in columns]
+        ours = CompiledFunction(function)(count, *columns)
+        for a, b in zip(ours, function.map(count).call(arguments), strict=True):
+            np.testing.assert_array_equal(a, np.array(b))
+            assert np.all(np.isfinite(a))

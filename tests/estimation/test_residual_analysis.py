@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.residual_analysis import has_enough_samples, largest_autocorrelations, residuals_are_white
 
 

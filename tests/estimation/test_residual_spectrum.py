@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.residual_spectrum import spectral_lines
 
 TIME = np.arange(1500) / 50.0

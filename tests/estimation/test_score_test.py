@@ -5,10 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.estimation.effect_sensitivities import SensitivityColumn
 from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.innovation_sensitivities import SensitivityColumn, linearise_filter
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.preprocessing import prepare_data

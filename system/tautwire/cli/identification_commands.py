@@ -276,7 +276,8 @@ def excite(
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
     from ..cosimulation.result_file import write_csv_metadata
-    from ..estimation.input_design import DesignOptions, default_limits, design_excitation, effects_by_name
+    from ..estimation.excitation_limits import default_limits
+    from ..estimation.input_design import DesignOptions, design_excitation, effects_by_name
     from ..provenance import refuse_foreign_csv_metadata
 
     output = CommandOutput(as_json, quiet)

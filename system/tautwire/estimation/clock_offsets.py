@@ -18,7 +18,7 @@ from ..errors import RecordingError
 from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from .estimation_data import DataSet, DataSplit
-from .innovation_sensitivities import LinearisedSegment, linearise_filter
+from .filter_linearisation import LinearisedSegment, linearise_filter
 from .likelihood import Likelihood
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY

@@ -27,8 +27,9 @@ from ..robot.schema import Robot
 from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_sensitivities import disturbance_sensitivities
 from .estimation_data import DataSet
+from .innovations import FilterSegment
 from .kalman_filter import Noise
-from .likelihood import FilterSegment, Likelihood
+from .likelihood import Likelihood
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import DisturbancePolicy
 

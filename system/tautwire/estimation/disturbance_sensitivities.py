@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
 from .disturbance import Disturbance
-from .likelihood import FilterSegment, Likelihood
+from .innovations import FilterSegment
+from .likelihood import Likelihood
 from .step_integration import compiled_with_arrays
 
 Array = NDArray[np.float64]

@@ -24,15 +24,16 @@ from threadpoolctl import threadpool_limits
 from ..errors import InputError, TautwireError
 from ..recordings.recording import Recording
 from ..robot.pose_trajectory import OrientationTrajectory, PoseTrajectory
-from ..robot.rigid_equilibrium import FREEDOMS, platform_size
+from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Point, Robot
-from ..robot.static_equilibrium import static_tensions
 from ..robot.trajectory import Trajectory
 from ..robot.winch_speeds import ideal_winch_speeds
+from .effect_sensitivities import EffectSensitivities
 from .estimation_data import DataSet
+from .excitation_limits import ExcitationLimits, can_turn
+from .filter_linearisation import linearise_filter
 from .hypotheses import Hypothesis, hypotheses
 from .identifiability import separation_nats, start_steps
-from .innovation_sensitivities import EffectSensitivities, linearise_filter
 from .kalman_filter import Noise
 from .likelihood import Likelihood
 from .measurement_noise import estimate_noise
@@ -60,20 +61,6 @@ class ExcitationError(TautwireError):
             f"none of {trial_count} programs keeps the winch speeds and tensions within their limits: "
             "give a larger --speed or a smaller --reach, or wider [tension] limits in the robot file"
         )
-
-
-@dataclass(frozen=True)
-class ExcitationLimits:
-    """Limits of an excitation: winch speed in m/s, distance from the start along each axis in m, tensions in N.
-
-    ``turn``, in rad, limits the rotation about each axis of a platform that six cables or more turn.
-    """
-
-    speed: float
-    reach: float
-    min_tension: float
-    max_tension: float
-    turn: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -143,7 +130,7 @@ def design_excitation(
 def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[float]]:
     """The best decision variables, and the scores of all programs in the order in which they were tried."""
     # An amplitude and a frequency of each sine on each axis.
-    count = 2 * SINES * (6 if _turns(design.robot) else 3)
+    count = 2 * SINES * (6 if can_turn(design.robot) else 3)
     # Sobol's sequence is balanced at powers of two.
     population = 2 ** ceil(log2(count))
     generations = max(1, round(design.options.programs / population) - 1)
@@ -207,7 +194,7 @@ class _DesignProblem:
         groups = np.asarray(decision_variables).reshape(2, SINES, -1)
         limits, platform = self.options.limits, self.robot.platform
         translation = self._multisine(platform.start, groups[:, :, :3], (limits.reach, limits.speed), scale)
-        if not _turns(self.robot):
+        if not can_turn(self.robot):
             return translation
         of_rotation = (limits.turn, limits.speed / platform_size(self.robot))
         rotation = self._multisine((0.0, 0.0, 0.0), groups[:, :, 3:], of_rotation, scale)
@@ -287,41 +274,8 @@ class _InfeasibleError(Exception):
     """Even a small motion along this path breaks a limit."""
 
 
-def _turns(robot: Robot) -> bool:
-    """Whether the winches can turn the platform as they like: fewer cables leave its orientation to statics."""
-    return robot.platform.is_rigid_body and robot.cable_count >= FREEDOMS
-
-
 def _as_rows(matrix: Array) -> tuple[tuple[float, float, float], ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in matrix)
-
-
-DEFAULT_SPEED_LIMIT = 0.5
-# Shares of the mean rope length, of the smallest and of the largest static tension.
-DEFAULT_REACH_RATIO, MIN_TENSION_RATIO, MAX_TENSION_RATIO = 0.05, 0.1, 3.0
-# rad, of a platform that turns; attachments then move about as far as its origin does.
-MAX_DEFAULT_TURN = 0.2
-
-
-def default_limits(robot: Robot, speed: float | None = None, reach: float | None = None) -> ExcitationLimits:
-    """Default limits: [winch] speed_limit or 0.5 m/s, a twentieth of the mean rope length, and [tension].
-
-    Without [tension] a tenth of the least static tension to three times the largest.
-    """
-    if robot.platform.is_rigid_body and robot.cable_count < FREEDOMS:
-        problem = f"has a platform on {robot.cable_count} cables, whose orientation statics decides along a path"
-        raise InputError(robot.name, problem, "record a motion of your own; six cables or more turn it as designed")
-    tensions = static_tensions(robot)
-    lengths = np.linalg.norm(np.array(robot.anchors) - np.array(robot.platform.start), axis=1)
-    declared_speed = robot.winch.speed_limit if robot.winch else None
-    distance = reach or DEFAULT_REACH_RATIO * float(np.mean(lengths))
-    return ExcitationLimits(
-        speed=speed or declared_speed or DEFAULT_SPEED_LIMIT,
-        reach=distance,
-        min_tension=robot.tension.minimum if robot.tension else MIN_TENSION_RATIO * float(np.min(tensions)),
-        max_tension=robot.tension.maximum if robot.tension else MAX_TENSION_RATIO * float(np.max(tensions)),
-        turn=min(MAX_DEFAULT_TURN, distance / platform_size(robot)) if _turns(robot) else 0.0,
-    )
 
 
 def effects_by_name(robot: Robot, names: str | None) -> tuple[Hypothesis, ...]:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
-from math import log, pi
+from dataclasses import replace
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,11 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
-from .compiled_filter import CompiledFilter, FilterInputs, FilterResults, FilterState
+from .compiled_filter import CompiledFilter, FilterInputs, FilterState
 from .disturbance import Disturbance
 from .filter_columns import align_delayed_outputs, filter_columns
 from .initial_state_prior import initial_covariance, settled_covariance
+from .innovations import FilterSegment, Innovations, concatenated
 from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBANCE, substeps_of_robot
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
@@ -38,53 +39,6 @@ Array = NDArray[np.float64]
 # Samples of a segment: binding functions to one takes as long as 40 samples, and its covariances take memory.
 SEGMENT_SAMPLES = 2_000
 SEGMENT_SAMPLES_WITH_COVARIANCES = 500
-
-
-@dataclass(frozen=True)
-class Innovations:
-    """Whitened innovations of N samples of m outputs, NaN where nothing was ``observed`` (N, m).
-
-    ``values`` (N, m) have unit variance where the model is right; ``sensitivities`` (N, m, p) are their derivatives by
-    the free parameters; ``log_variances`` (N, m) the log of the variances that they were divided by. ``constants`` (c)
-    are the uncertain parameters as filtered, in declared standard deviations. ``segments`` are those of the filter's
-    run where they were to be kept.
-    """
-
-    observed: NDArray[np.bool_]
-    values: Array
-    sensitivities: Array
-    log_variances: Array
-    constants: Array = field(default_factory=lambda: np.zeros(0))
-    segments: tuple[FilterSegment, ...] = ()
-
-    def log_likelihood(self, rows: NDArray[np.bool_]) -> float:
-        """Log of the probability density, in SI units, of the samples in ``rows`` given those before them."""
-        mask = self.observed & rows[:, None]
-        terms = self.values[mask] ** 2 + self.log_variances[mask] + log(2.0 * pi)
-        return float(-0.5 * np.sum(terms))
-
-    def mean_square(self, rows: NDArray[np.bool_]) -> Array:
-        """Mean square of each output's innovations, shape (m,); one where the model is right, NaN if unobserved."""
-        count = np.sum(self.observed[rows], axis=0)
-        total = np.nansum(self.values[rows] ** 2, axis=0)
-        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
-
-    def overall_mean_square(self, rows: NDArray[np.bool_]) -> float:
-        """The mean of :meth:`mean_square` over the observed outputs."""
-        return float(np.nanmean(self.mean_square(rows)))
-
-
-@dataclass(frozen=True)
-class FilterSegment:
-    """Filter segment: K successive samples of a filter's run.
-
-    ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`; ``is_recorded`` (K) tells which
-    samples are the recording's, the others fill gaps.
-    """
-
-    columns: tuple[Array, ...]
-    is_recorded: NDArray[np.bool_]
-    results: FilterResults
 
 
 class Likelihood:
@@ -145,7 +99,7 @@ class Likelihood:
             recording, (measured, shift), parameters, covariance, acceleration_noise_density, keeps_segments
         )
         kept = tuple(filter_segments) if keeps_segments else ()
-        values, log_variances, sensitivities, last_state = _concatenated(kept or filter_segments)
+        values, log_variances, sensitivities, last_state = concatenated(kept or filter_segments)
         recorded = np.isfinite(self._measured(recording))
         values[~recorded] = np.nan
         log_variances[~recorded] = np.nan
@@ -258,7 +212,7 @@ class Likelihood:
         no_measurements = np.full((recording.sample_count, output_count(self.model)), np.nan)
         outputs = (no_measurements, np.zeros_like(no_measurements))
         filter_segments = self._filter(recording, outputs, parameters, self._start_covariance_of_lengths(), 0.0)
-        _, log_variances, *_ = _concatenated(filter_segments)
+        _, log_variances, *_ = concatenated(filter_segments)
         variances: Array = np.exp(log_variances)
         return variances
 
@@ -333,17 +287,6 @@ class Likelihood:
             both = np.ix_(*[[self.model.indices.lengths.start + cable, size + cable]] * 2)
             covariance[both] = error.rms**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return covariance
-
-
-def _concatenated(segments: Iterable[FilterSegment]) -> tuple[Array, Array, Array, Array]:
-    """Innovations, log variances and sensitivities of the recording's samples; and the last state."""
-    parts, last_state = [], np.zeros(0)
-    for segment in segments:
-        rows, results = segment.is_recorded, segment.results
-        parts.append((results.values[rows], results.log_variances[rows], results.sensitivities[rows]))
-        last_state = results.states[:, -1]
-    values, log_variances, sensitivities = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return values, log_variances, sensitivities, last_state
 
 
 def _fill_unaligned(values: Array, log_variances: Array, sensitivities: Array, unaligned: NDArray[np.bool_]) -> None:

@@ -18,8 +18,9 @@ from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from .disturbance import NEUTRAL, Disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, free_parameters, value_of, with_values
+from .innovations import Innovations
 from .kalman_filter import Noise
-from .likelihood import Innovations, Likelihood
+from .likelihood import Likelihood
 from .normal_equations import compressed_residuals
 from .policy import DEFAULT_POLICY, FitPolicy
 

@@ -27,7 +27,7 @@ from .disturbance_fit import joint_fit, with_fitted_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
-from .likelihood import Innovations
+from .innovations import Innovations
 from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, NoFitError, parameter_bounds, parameter_scales
 from .policy import StabilityPolicy
 

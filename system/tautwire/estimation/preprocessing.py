@@ -31,9 +31,9 @@ from .disturbance_fit import with_fitted_disturbance
 from .disturbance_posterior import disturbance_prior
 from .estimation_data import DataSet, DataSplit, split_data
 from .initial_state_prior import self_stress_deviation, with_motion_at_start
+from .innovations import Innovations
 from .integration_steps import require_followable
 from .kalman_filter import Noise
-from .likelihood import Innovations
 from .measurement_noise import check_noise, estimate_noise
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, IdentificationPolicy, ResidualAnalysisPolicy

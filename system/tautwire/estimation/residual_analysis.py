@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .likelihood import Innovations
+from .innovations import Innovations
 from .policy import DEFAULT_POLICY, ResidualAnalysisPolicy
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import detrend, find_peaks, peak_prominences, welch
 
 from .discovery.policy import SpectralLinePolicy
-from .likelihood import Innovations
+from .innovations import Innovations
 from .localisation.policy import ResonancePeakPolicy
 from .policy import DEFAULT_POLICY
 

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import Effect
 
 from ..robot.schema import Robot
+from .effect_sensitivities import EffectSensitivities, SensitivityColumn
 from .estimation_data import DataSet
+from .filter_linearisation import LinearisedSegment, linearise_filter
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
 from .identification_context import IdentificationContext
-from .innovation_sensitivities import EffectSensitivities, LinearisedSegment, SensitivityColumn, linearise_filter
 from .parameter_fit import Fitter
 
 Array = NDArray[np.float64]

@@ -38,8 +38,8 @@ from ..robot.uncertain_parameters import (
     uncertain_parameters,
 )
 from .estimation_data import DataSet
+from .filter_linearisation import linearise_filter
 from .hypotheses import Hypothesis
-from .innovation_sensitivities import linearise_filter
 from .kalman_filter import Noise
 from .likelihood import Likelihood
 from .measured_outputs import orientations

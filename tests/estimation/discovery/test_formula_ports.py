@@ -10,7 +10,7 @@ import pytest
 from tautwire.estimation.discovery.candidate_terms import Term
 from tautwire.estimation.discovery.formula_ports import FormulaPorts, series_sensitivities
 from tautwire.estimation.disturbance import OrnsteinUhlenbeck
-from tautwire.estimation.innovation_sensitivities import linearise_filter
+from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise

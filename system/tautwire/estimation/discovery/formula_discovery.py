@@ -21,7 +21,7 @@ from ...errors import UnreachableError
 from ...robot.schema import Formula, Robot
 from ..estimation_data import DataSet, DataSplit
 from ..hypotheses import Hypothesis
-from ..likelihood import Innovations
+from ..innovations import Innovations
 from ..parameter_fit import Fit, Fitter, NoFitError
 from ..policy import DEFAULT_POLICY
 from ..residual_analysis import residuals_are_white

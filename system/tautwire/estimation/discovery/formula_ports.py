@@ -22,7 +22,7 @@ from ...robot.robot_assembly import NUMPY_MATHEMATICS, RobotAssembly, assemble_r
 from ...robot.schema import Formula, Robot
 from ...robot.symbolic_model import FORMULA_INDEX, FreeParameter, symbolic_model
 from ...robot.uncertain_parameters import uncertain_parameters
-from ..innovation_sensitivities import LinearisedSegment
+from ..filter_linearisation import LinearisedSegment
 from ..measurement_model import SensorInstant, delayed_outputs
 from ..native_functions import CompiledFunction, by_sample
 

@@ -26,7 +26,7 @@ from tautwire_fmu.laws.formula import FORCE_TARGETS
 from ...errors import TautwireError
 from ...robot.schema import Robot
 from ..estimation_data import DataSet, DataSplit
-from ..innovation_sensitivities import LinearisedSegment, linearise_filter
+from ..filter_linearisation import LinearisedSegment, linearise_filter
 from ..likelihood import Likelihood
 from ..parameter_fit import Fitter
 from ..policy import DEFAULT_POLICY

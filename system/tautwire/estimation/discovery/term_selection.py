@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from ...robot.schema import Robot
 from ...robot.symbolic_model import FORMULA_INDEX
 from ..estimation_data import DataSet
+from ..filter_linearisation import linearise_filter
 from ..hypotheses import Hypothesis, free_parameters
-from ..innovation_sensitivities import linearise_filter
 from ..parameter_fit import Fitter
 from ..policy import DEFAULT_POLICY
 from .candidate_terms import SignalRanges, Term, signal_ranges

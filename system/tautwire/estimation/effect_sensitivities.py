@@ -1,24 +1,16 @@
-"""Sensitivities of the innovations: the filter's run linearised, and how an absent effect would begin to act along it.
-
-With the filter's gain held, sensitivities ``S`` of the predicted state to parameters follow
-
-    dv = C S + D          S' = A (S - K dv) + B
-
-where ``C`` and ``A`` are the derivatives of the outputs and of the next state by the state, and ``D`` and ``B``
-those by the parameters. All but ``D`` and ``B`` belong to the run, so that any number of parameters costs one run.
-
-Source: Ljung (1999), System Identification, sec. 11.4; Anderson and Moore (1979), Optimal Filtering, ch. 5.
+"""Sensitivities of the innovations to an effect that is absent: how it would begin to act along a filter's run.
 
 With the effect's states ``z`` and their sensitivities ``Z`` to its parameters
 
     dz/dt = g(x, z)        dZ/dt = g_z Z + g_p        d(dx/dt) = f_p + f_z Z        d(outputs) = h_p + h_z Z
 
-are taken along the run's states ``x``: an absent effect moves nothing, so it need not be simulated with them.
+are taken along the run's states ``x``, see :mod:`tautwire.estimation.filter_linearisation`: an absent effect moves
+nothing, so it need not be simulated with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi
@@ -28,129 +20,19 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..recordings.recording import Recording
 from ..robot.schema import PER_CABLE_COMPONENTS, Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
+from .filter_linearisation import LinearisedSegment
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis
-from .likelihood import Likelihood
 from .measurement_model import SensorInstant, delayed_outputs
 from .native_functions import CompiledFunction, by_sample
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class LinearisedSegment:
-    """Linearised filter segment: K successive samples of a run.
-
-    ``states`` (n, K + 1) as predicted, their unstrained lengths the true ones where others were recorded; winch
-    ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and ``shift`` (m, K) in s; ``rotation`` (3, K) as
-    measured, empty for a point mass. ``transition`` A
-    (K, n, n), ``half_transition`` the same from half a step before the next sample, ``output_matrix`` C (K, m, n),
-    ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit variance and is zero where
-    nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain`` have the states of a disturbance
-    behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for FilterResults, values and
-    sensitivities zero where nothing was observed.
-    """
-
-    states: Array
-    speeds: Array
-    step: Array
-    shift: Array
-    rotation: Array
-    transition: Array
-    half_transition: Array
-    output_matrix: Array
-    gain: Array
-    whitening: Array
-    observed: NDArray[np.bool_]
-    is_recorded: NDArray[np.bool_]
-    values: Array
-    sensitivities: Array
-
-    def integrated_forcing(self, rate_sensitivities: Array) -> Array:
-        """State forcing B (K, n, p) by Simpson's rule from sensitivities of the rates (K + 1, n, p) at the samples."""
-        begin, end = rate_sensitivities[:-1], rate_sensitivities[1:]
-        transition = self.transition[:, : begin.shape[1], : begin.shape[1]]
-        forcing: Array = (
-            self.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * self.half_transition @ (begin + end) + end)
-        )
-        return forcing
-
-    def propagate_sensitivities(
-        self, state_sensitivities: Array, state_forcing: Array, output_forcing: Array
-    ) -> tuple[Array, Array]:
-        """Sensitivities of the predicted state (n, p) after this segment, and of the whitened innovations (K, m, p).
-
-        ``state_forcing`` is B (K, n, p), ``output_forcing`` D (K, m, p).
-        """
-        output_changes = np.empty_like(output_forcing)
-        # Nothing acts on the states of a disturbance.
-        forced = state_forcing.shape[1]
-        sensitivities = np.pad(state_sensitivities, ((0, self.transition.shape[1] - len(state_sensitivities)), (0, 0)))
-        for k in range(len(output_forcing)):
-            output_changes[k] = self.output_matrix[k] @ sensitivities + output_forcing[k]
-            sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k])
-            sensitivities[:forced] += state_forcing[k]
-        return sensitivities, -(self.whitening @ output_changes)
-
-
-def linearise_filter(
-    likelihood: Likelihood, values: list[float], recording: Recording, acceleration_noise_density: float = 0.0
-) -> Iterator[LinearisedSegment]:
-    """Linearise a filter's run over a recording, segment by segment, at some values of its free parameters.
-
-    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows what was measured where the model does
-    not.
-    """
-    theta = likelihood.arguments(values)[:, None]
-    size = likelihood.model.states.numel()
-    variances = likelihood.noise.white_variances(likelihood.cable_count)
-    for segment in likelihood.segments(recording, values, acceleration_noise_density):
-        _, observed, shift, speed, later, step, _, rotation = segment.columns
-        count = observed.shape[1]
-        results, predicted = segment.results, segment.results.states[:, :-1]
-        is_observed = observed.T[:, :, None] > 0.0
-        innovations = np.where(is_observed[:, :, 0], results.values, 0.0)
-        output_matrix = results.output_matrices
-        cross_covariance = results.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
-        covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
-        covariance, cholesky_factor = factorised(covariance)
-        whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
-        gain = cross_covariance @ np.linalg.inv(covariance)
-        corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
-        updated = likelihood.with_true_lengths(predicted + corrections.T)
-        rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
-        yield LinearisedSegment(
-            likelihood.with_true_lengths(results.states),
-            np.hstack([speed, later[:, -1:]]),
-            step[0],
-            shift,
-            rotation,
-            results.transitions,
-            _half_transition(results.transitions[:, :size, :size], rate_jacobian, step[0]),
-            output_matrix,
-            gain,
-            whitening,
-            is_observed[:, :, 0],
-            segment.is_recorded,
-            innovations,
-            np.where(is_observed, results.sensitivities, 0.0),
-        )
-
-
-def _half_transition(transition: Array, rate_jacobian: Array, step: Array) -> Array:
-    """Transition from the middle of each step (K, n, n), from the cubic through both of its ends."""
-    identity = np.eye(transition.shape[1])
-    bend: Array = step[:, None, None] / 8.0 * (identity - transition) @ rate_jacobian
-    return 0.5 * (transition + identity) + bend
-
-
 # Integration steps of an effect's states in a sample; they can be stiffer than the robot.
 EFFECT_SUBSTEPS = 4
-# Of the innovations' correlation matrix: less is rounding.
-MIN_RELATIVE_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -300,24 +182,6 @@ class EffectSensitivities:
         )
         self._effect_states_now[trial] = (effect_states[:, -1:], sensitivities[:, parameter_count * count :])
         return effect_states, sensitivities
-
-
-def factorised(covariance: Array) -> tuple[Array, Array]:
-    """Covariances (K, m, m) and their Cholesky factors.
-
-    Where rounding has left one not positive definite, its eigenvalues are raised; NaN where one is not finite.
-    """
-    try:
-        return covariance, np.asarray(np.linalg.cholesky(covariance), dtype=float)
-    except np.linalg.LinAlgError:
-        is_finite = np.all(np.isfinite(covariance), axis=(1, 2), keepdims=True)
-        deviations = np.sqrt(np.maximum(np.abs(np.diagonal(covariance, axis1=1, axis2=2)), np.finfo(float).tiny))
-        scale = deviations[:, :, None] * deviations[:, None, :]
-        eigenvalues, vectors = np.linalg.eigh(np.where(is_finite, covariance / scale, np.eye(covariance.shape[1])))
-        raised = np.maximum(eigenvalues, MIN_RELATIVE_EIGENVALUE)[:, None, :]
-        definite = np.where(is_finite, scale, 1.0) * ((vectors * raised) @ vectors.swapaxes(1, 2))
-        factors = np.asarray(np.linalg.cholesky(definite), dtype=float)
-        return np.where(is_finite, definite, np.nan), np.where(is_finite, factors, np.nan)
 
 
 def _with_last_column_repeated(columns: Array) -> Array:

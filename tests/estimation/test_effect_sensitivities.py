@@ -1,4 +1,4 @@
-"""The linearised run against runs of the filter itself, moved a little."""
+"""Sensitivities to an absent effect against runs of the filter itself, moved a little."""
 
 from dataclasses import replace
 
@@ -7,12 +7,8 @@ import pytest
 from casadi import DM, SX, vertcat
 
 from tautwire.estimation.disturbance import OrnsteinUhlenbeck
-from tautwire.estimation.innovation_sensitivities import (
-    EffectSensitivities,
-    _sensitivity_pattern,
-    factorised,
-    linearise_filter,
-)
+from tautwire.estimation.effect_sensitivities import EffectSensitivities, _sensitivity_pattern
+from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
@@ -89,36 +85,6 @@ def test_slopes_of_an_absent_effect_are_those_along_the_true_lengths(name: str, 
     expected = exact(name, parameter, {}, LENGTHS)[:, :, 0]
     found = np.sum(along(name, (parameter,), {}, LENGTHS), axis=2)
     assert np.sum((found - expected) ** 2) < 1e-7 * np.sum(expected**2)
-
-
-def test_what_was_not_seen_moves_nothing() -> None:
-    blind = replace(RECORDING, tension=RECORDING.tension.copy())
-    blind.tension[100:300, 1] = np.nan
-    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    runs = list(linearise_filter(likelihood, [], blind))
-    seen = np.concatenate([run.observed[run.is_recorded] for run in runs])
-    assert np.array_equal(seen, np.isfinite(blind.measured()))
-    whitening = np.concatenate([run.whitening[run.is_recorded] for run in runs])
-    assert not np.any(whitening[~seen])
-
-
-def test_the_run_has_the_innovations_of_the_filter() -> None:
-    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    values = np.concatenate([run.values[run.is_recorded] for run in linearise_filter(likelihood, [], RECORDING)])
-    assert np.allclose(values, likelihood.innovations(RECORDING, []).values, atol=1e-12)
-
-
-def test_a_covariance_that_rounding_left_indefinite_is_factorised_all_the_same() -> None:
-    # Two outputs of one metre each that are equal but for rounding, and a third in newtons.
-    indefinite = np.array([[1.0, 1.0 + 1e-15, 0.0], [1.0 + 1e-15, 1.0, 0.0], [0.0, 0.0, 1e8]])
-    regular, broken = np.diag([1e-8, 1e-8, 1.0]), np.full((3, 3), np.nan)
-    covariance, factor = factorised(np.array([indefinite, regular, broken]))
-    np.testing.assert_allclose(factor[:2] @ factor[:2].swapaxes(1, 2), covariance[:2], rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(covariance[0], indefinite, rtol=1e-9)
-    np.testing.assert_allclose(covariance[1], regular, rtol=1e-15)
-    assert np.all(np.isfinite(np.linalg.inv(covariance[:2])))
-    assert np.all(np.isnan(factor[2]))
-    np.testing.assert_array_equal(factorised(regular[None])[1][0], np.linalg.cholesky(regular))
 
 
 def test_states_are_sensitive_only_to_what_reaches_them() -> None:
