@@ -13,7 +13,7 @@ from tautwire.estimation import identification_stages
 from tautwire.estimation.explained_shares import ExplainedShares
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext, no_progress
-from tautwire.estimation.identification_stages import drop_unsteady_effects
+from tautwire.estimation.identification_stages import drop_least_evident_effects, select_beside_disturbance
 from tautwire.estimation.identification_state import Identification
 from tautwire.estimation.parameter_fit import Fit, NoFitError
 from tautwire.estimation.policy import DEFAULT_POLICY
@@ -30,6 +30,9 @@ class ContextWithPolicy:
 
     policy: Any = DEFAULT_POLICY
     progress: Any = no_progress
+    robot: Any = ROBOT
+    fitter: Any = None
+    split: Any = None
 
 
 def with_effects(*names: str, **spreads: float) -> Identification:
@@ -72,14 +75,14 @@ def test_the_least_evident_go_until_one_is_steady_and_explains_enough(
     monkeypatch.setattr(identification_stages, "without_least_evident", without_last)
     monkeypatch.setattr(identification_stages, "_explained_beside_disturbance", explained)
     state = with_effects("modulus", "relaxation", "slack", **dict.fromkeys(alone, 0.9))
-    fewer = drop_unsteady_effects(state)
+    fewer = drop_least_evident_effects(state)
     assert [hypothesis.effect.name for hypothesis in fewer.selection.accepted] == names
     assert len(names) < 3 or fewer is state
 
 
 def test_a_selection_of_which_one_effect_is_steady_stays_as_it_is() -> None:
     state = with_effects("modulus", "relaxation", modulus=0.1, relaxation=0.9)
-    assert drop_unsteady_effects(state) is state
+    assert drop_least_evident_effects(state) is state
 
 
 def test_a_selection_whose_others_cannot_be_fitted_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -88,7 +91,7 @@ def test_a_selection_whose_others_cannot_be_fitted_stays_as_it_is(monkeypatch: p
 
     monkeypatch.setattr(identification_stages, "without_least_evident", without_last)
     state = with_effects("modulus", "relaxation", modulus=0.9, relaxation=0.9)
-    assert drop_unsteady_effects(state) is state
+    assert drop_least_evident_effects(state) is state
 
 
 def test_the_declared_robot_is_localised_whatever_uncertain_numbers_would_take_up(
@@ -104,3 +107,22 @@ def test_the_declared_robot_is_localised_whatever_uncertain_numbers_would_take_u
     state = with_effects()
     identification_stages.start_side_runs(replace(state, context=context, prepared=prepared))
     assert [call[1:4] for call in submitted] == [(ROBOT, "FIT as recorded", "noise")]
+
+
+@pytest.mark.parametrize(("size", "is_answer"), [(50.0, True), (200.0, False)])
+def test_effects_that_nearly_cancel_are_no_answer_beside_a_disturbance(
+    size: float, is_answer: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    white = with_effects("modulus", "relaxation", modulus=0.1, relaxation=0.1)
+    beside = with_effects("slack", slack=0.1)
+    assert beside.shares is not None
+    shares = replace(beside.shares, effects=(0.95,), sizes=(size,), left=0.05, size_missed=30.0)
+    beside = replace(beside, shares=shares)
+    prepared: Any = SimpleNamespace(fitter=None, split=None)
+    monkeypatch.setattr(identification_stages, "_is_explained_by_few_effects", lambda state: False)
+    monkeypatch.setattr(identification_stages, "with_disturbance", lambda *_: prepared)
+    monkeypatch.setattr(identification_stages, "select", lambda state: replace(beside, unexplained=state.unexplained))
+    for stage in ("separate_cables", "confirm_effects"):
+        monkeypatch.setattr(identification_stages, stage, lambda state: state)
+    answer = select_beside_disturbance(white)
+    assert (answer is not white) == is_answer

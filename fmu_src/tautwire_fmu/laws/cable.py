@@ -163,8 +163,7 @@ def with_start_cell_tension(
     line = Span(cable.start_direction, cable.start_length, chord, 0.0, (0.0, 0.0, 0.0))
     at_rest = start_state(cable, effects)
     motion = cable_motion(m, cable, effects, at_rest, line, 0.0)
-    _, tension = _span_tension(m, cable, effects, at_rest, motion)
-    return cable._replace(start_cell_tension=_end_forces(m, cable, effects, motion, tension)[1])
+    return cable._replace(start_cell_tension=_cell_tension(m, cable, effects, at_rest, motion))
 
 
 def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Sequence[ActiveEffect] = ()) -> Span:
@@ -225,8 +224,7 @@ def state_rates(
         for active, own in zip(effects, state.effects)
     )
     if stages.has_low_pass(effects):
-        _, tension = _span_tension(m, cable, effects, state, motion)
-        _, cell_tension = _end_forces(m, cable, effects, motion, tension)
+        cell_tension = _cell_tension(m, cable, effects, state, motion)
         _, filter_rates = _filtered(m, cable, effects, state, cell_tension)
         effect_rates = tuple(own or filtered for own, filtered in zip(effect_rates, filter_rates))
     return CableState(
@@ -291,6 +289,14 @@ def _end_forces(
     end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
     force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
     return add(force, stages.lateral_force(m, effects, line)), (tension + end_tension) * m.exp(log_cell_ratio)
+
+
+def _cell_tension(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], state: CableState, motion: CableMotion
+) -> Any:
+    """Tension at the load cell before its low-pass filter, in N."""
+    _, tension = _span_tension(m, cable, effects, state, motion)
+    return _end_forces(m, cable, effects, motion, tension)[1]
 
 
 def _filtered(

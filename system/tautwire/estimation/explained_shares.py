@@ -90,7 +90,7 @@ class ExplainedShares:
         return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]
 
     def uncancelled(self, policy: SizePolicy) -> list[int]:
-        """Indices of the effects that change no more than others could nearly cancel."""
+        """Indices of the effects that change the outputs by few times what is missed: none nearly cancels another."""
         largest = policy.max_size_to_missed * self.size_missed
         return [index for index, size in enumerate(self.sizes) if size <= largest]
 

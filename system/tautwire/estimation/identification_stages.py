@@ -115,7 +115,7 @@ def confirm_effects(state: Identification) -> Identification:
     return state
 
 
-def drop_unsteady_effects(state: Identification) -> Identification:
+def drop_least_evident_effects(state: Identification) -> Identification:
     """Take out the least evident effects where none is the same on all stretches, if the others then explain enough.
 
     Beside an effect whose form is not quite nature's another may stand for what is left, and neither keeps its size.
@@ -181,7 +181,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     separate_cables,
     cosimulate_before,
     confirm_effects,
-    drop_unsteady_effects,
+    drop_least_evident_effects,
     explain_by_formula,
     select_beside_disturbance,
     judge,
@@ -198,7 +198,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
-    drop_unsteady_effects: (attrgetter("second_search"), "taking out effects that differ from stretch to stretch"),
+    drop_least_evident_effects: (attrgetter("second_search"), "fewer effects, where none gets a name"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
