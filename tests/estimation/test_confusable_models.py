@@ -53,14 +53,16 @@ def test_a_softer_rope_keeps_its_name() -> None:
     assert list(judged(SOFTER, softer).accepted) == softer
 
 
-@pytest.mark.parametrize(("has_disturbance", "expected"), [(False, {"frame", "hanging_load"}), (True, {"frame"})])
+@pytest.mark.parametrize(
+    ("has_disturbance", "expected"), [(False, {"frame", "hanging_load", "stiffening"}), (True, {"frame", "stiffening"})]
+)
 def test_unlisted_effects_that_were_searched_for_are_not_tried_again(has_disturbance: bool, expected: set[str]) -> None:
     robot, softer = example("three"), Hypothesis(BY_NAME["modulus"], (1, 2))
     searched = hypotheses(robot, has_disturbance)
     alternatives = list(confusable_models._unlisted_alternatives(robot, [softer], searched, is_adequate=False))
     assert {chosen[-1].effect.name for chosen in alternatives} == expected
-    # Frames of the two cables and of all; each in place of the softer ropes, and beside them.
-    assert len(alternatives) == 2 * 2 + 2 * ("hanging_load" in expected)
+    # Frames of the two cables and of all, stiffening of the two; each in place of the softer ropes, and beside them.
+    assert len(alternatives) == 2 * 3 + (0 if has_disturbance else 2 * 2)
 
 
 @pytest.mark.validate

@@ -23,10 +23,11 @@ def test_effects_of_rigid_bodies_are_tried_on_them_alone() -> None:
 
 
 @pytest.mark.parametrize("robot", [crane_robot(), example("eight")])
-def test_a_hanging_load_is_tried_beside_a_disturbance_only(robot: Robot) -> None:
+def test_hanging_loads_and_stiffening_are_tried_beside_a_disturbance_only(robot: Robot) -> None:
     beside = hypotheses(robot, has_disturbance=True)
-    assert set(beside) - set(hypotheses(robot)) == {Hypothesis(BY_NAME["hanging_load"], ())}
-    assert len(beside) == len(hypotheses(robot)) + 1
+    unlisted = {Hypothesis(BY_NAME["hanging_load"], ()), Hypothesis(BY_NAME["stiffening"], robot.cable_numbers)}
+    assert set(beside) - set(hypotheses(robot)) == unlisted
+    assert len(beside) == len(hypotheses(robot)) + 2
 
 
 def test_an_attachment_is_tried_of_one_cable_at_a_time() -> None:

@@ -12,7 +12,7 @@ from tautwire.estimation.kalman_filter import output_function, preparation_funct
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.native_functions import CompiledFunction, by_sample
 from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
-from tests.support.effect_cases import CASES, Case
+from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.memory import TOLD, resident_memory
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -97,7 +97,7 @@ def test_functions_that_are_kept_take_little_memory() -> None:
     assert len(kept) == 11
 
 
-@pytest.mark.parametrize("case", CASES, ids=str)
+@pytest.mark.parametrize("case", (*CASES, *UNLISTED_CASES), ids=str)
 def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: Case) -> None:
     robot, recording = example("three"), recorded("three", 1)
     noise, count = estimate_noise(robot, recording), 50

@@ -25,7 +25,7 @@ from tautwire.linear import (
     linearise_robot_fmus,
 )
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu, Winch
-from tests.support.effect_cases import CASES, Case
+from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.effects import with_effects
 from tests.support.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.support.rigid_robots import octahedral_robot
@@ -95,7 +95,7 @@ def smooth(case: Case) -> bool:
 
 
 @pytest.mark.validate(but=["damping-damping"])
-@pytest.mark.parametrize("case", [case for case in CASES if smooth(case)], ids=str)
+@pytest.mark.parametrize("case", [case for case in (*CASES, *UNLISTED_CASES) if smooth(case)], ids=str)
 def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path) -> None:
     robot = with_effects(paper_robot(damping=4e8), case)
     exact = linearise(robot).system

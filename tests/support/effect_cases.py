@@ -80,6 +80,12 @@ CASES = (
     Case("sensor_delay", {"seconds": 0.05, "outputs": "position"}, {"position_delay": 0.05}),
     Case("sensor_delay", {"seconds": 0.05, "form": "lag"}, {"tension_time_constant": 0.05}),
 )
+# What a trace may discover: the rig has them in forms of its own, for which they stand.
+UNLISTED_CASES = (
+    same("frame", compliance=3e-7),
+    same("hanging_load", weight=200.0),
+    same("stiffening", 1, 3, quadratic=100.0),
+)
 # On platforms that turn: those that only they can have, and those whose forces act at a point of theirs.
 RIGID_CASES = (
     same("centre_of_mass", x=0.02, y=-0.01, z=0.03),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tautwire_fmu.laws.effects import ALL, ANCHOR, ATTACHMENT, BY_NAME, HANGING_LOAD, Effect, Parameter
+from tautwire_fmu.laws.effects import ALL, ANCHOR, ATTACHMENT, BY_NAME, HANGING_LOAD, STIFFENING, Effect, Parameter
 
 from ..robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
@@ -83,9 +83,11 @@ def with_hypothesis(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hyp
 def hypotheses(robot: Robot, has_disturbance: bool = False) -> tuple[Hypothesis, ...]:
     """All single effects that could act on a robot, each in its forms that contain no smaller one.
 
-    Beside a disturbance, which hides how a load swings, a hanging load too: sag, or offsets, would get its credit.
+    Beside a disturbance, which hides how a load swings, a hanging load too: sag, or offsets, would get its credit. And
+    ropes that stiffen, for which a search would take softer and stiffer ropes, slack and hysteresis one by one.
     """
-    candidates = [Hypothesis(HANGING_LOAD, ())] if has_disturbance else []
+    unlisted = (Hypothesis(HANGING_LOAD, ()), Hypothesis(STIFFENING, robot.cable_numbers))
+    candidates = list(unlisted) if has_disturbance else []
     for effect in ALL:
         for form in _minimal_forms(effect.forms_on(robot.platform.is_rigid_body)):
             if effect.component not in PER_CABLE_COMPONENTS:

@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tests.support.effect_cases import CASES, PAIRS, Case, same
+from tests.support.effect_cases import CASES, PAIRS, UNLISTED_CASES, Case, same
 from tests.support.effects import with_effects
 from tests.support.fmus import Hand, in_hand
 from tests.support.native import both_kinds, both_runs, largest_difference
@@ -70,7 +70,9 @@ def test_all_effects_together_run_as_in_python(complete_fmus: tuple[RobotFmus, R
 
 
 @pytest.mark.validate
-@pytest.mark.parametrize("cases", [*((case,) for case in CASES), *PAIRS], ids=lambda cases: "+".join(map(str, cases)))
+@pytest.mark.parametrize(
+    "cases", [*((case,) for case in (*CASES, *UNLISTED_CASES)), *PAIRS], ids=lambda cases: "+".join(map(str, cases))
+)
 def test_each_effect_runs_as_in_python(cases: tuple[Case, ...], tmp_path: Path) -> None:
     time, speed = gentle_speeds(example("three"), 1.0, 0.02)
     python, native = both_runs(with_effects(example("three"), *cases), tmp_path, time, speed)

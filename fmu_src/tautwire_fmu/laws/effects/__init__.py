@@ -25,6 +25,7 @@ from .sensor_delay import SENSOR_DELAY
 from .sensor_gain import SENSOR_GAIN
 from .sensor_offset import SENSOR_OFFSET
 from .slack import SLACK
+from .stiffening import STIFFENING
 from .thermal import THERMAL
 from .transverse_damping import TRANSVERSE_DAMPING
 
@@ -54,7 +55,7 @@ ALL: Tuple[Effect, ...] = (
 )
 
 # Effects outside the list: a trace that selects one has discovered it.
-UNLISTED: Tuple[Effect, ...] = (FRAME, HANGING_LOAD)
+UNLISTED: Tuple[Effect, ...] = (FRAME, HANGING_LOAD, STIFFENING)
 
 BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in (*ALL, *UNLISTED)}
 
