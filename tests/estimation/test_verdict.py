@@ -131,6 +131,22 @@ def test_what_is_not_on_the_list_is_discovered_with_its_share() -> None:
     assert "This effect is not on the list of known ones: frame: compliance = 1e-05 m/N." in sentence
 
 
+@pytest.mark.parametrize(
+    ("of_friction", "of_stiffening", "expected", "is_told"),
+    [(0.3, 0.65, "discovered", True), (0.65, 0.3, "effects", True), (0.94, 0.01, "effects", False)],
+)
+def test_the_largest_effect_decides_whether_the_verdict_is_of_the_list(
+    of_friction: float, of_stiffening: float, expected: str, is_told: bool
+) -> None:
+    stiffening = Hypothesis(BY_NAME["stiffening"], ROBOT.cable_numbers)
+    robot = ROBOT.with_effect(EffectSetting("stiffening", {"quadratic": 114.2}, ROBOT.cable_numbers))
+    of = shares(0.05, 60.0, friction=(of_friction, 50.0), stiffening=(of_stiffening, 50.0))
+    selection = selected(hypothesis("friction"), stiffening, robot=robot)
+    word, sentence = verdict_beside_disturbance(CONTEXT, selection, of, MISSED, REMAINING)
+    assert word == expected
+    assert ("not on the list of known ones: stiffening: quadratic = 114.2." in sentence) == is_told
+
+
 def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> None:
     of = shares(0.45, 60.0, payload=(0.55, 40.0))
     assert verdict(of, "payload")[0] == "effects"

@@ -42,7 +42,7 @@ def verdict_of(
     pronoun = "it" if len(substantial) == 1 else "them"
     lacks = f"The model lacks {lacking}; with {pronoun}{with_small}, {IS_WHITE}."
     formula = confirmed_formula(robot, selection, effects_hold, discovery)
-    if effects_hold and formula:
+    if effects_hold and formula and _unlisted(substantial):
         return "discovered", f"{lacks} {_not_listed(formula)}"
     if effects_hold:
         return "effects", lacks
@@ -90,8 +90,11 @@ def verdict_beside_disturbance(
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
         sentence = f"{lacks} The error is then {remaining}."
-        formula = confirmed_formula(context.robot, selection, effects_hold=True, discovery=None)
-        return ("discovered", f"{sentence} {_not_listed(formula)}") if formula else ("effects", sentence)
+        unlisted = _unlisted([accepted[index] for index in large])
+        if not unlisted:
+            return "effects", sentence
+        word: Verdict = "discovered" if accepted[large[0]] in unlisted else "effects"
+        return word, f"{sentence} {_not_listed(_formula_of(context.robot, selection, unlisted))}"
     varies = ""
     if len(shares.steady(policy)) < len(accepted):
         varies = ", which would have to change from stretch to stretch"
@@ -151,10 +154,14 @@ def confirmed_formula(
     """Formula of what is not on the list; None where there is none."""
     if discovery:
         return formula_text(robot, discovery.formulas)
-    unlisted = _unlisted_hypotheses(selection) if effects_hold else []
-    return effects_text([(h.label(robot), setting_of(selection.fit.robot, h)) for h in unlisted]) or None
+    unlisted = _unlisted(selection.accepted) if effects_hold else []
+    return _formula_of(robot, selection, unlisted) or None
 
 
-def _unlisted_hypotheses(selection: SelectionResult) -> list[Hypothesis]:
-    """Accepted effects that are not on the list."""
-    return [hypothesis for hypothesis in selection.accepted if hypothesis.effect in UNLISTED]
+def _unlisted(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Those of some accepted effects that are not on the list."""
+    return [hypothesis for hypothesis in accepted if hypothesis.effect in UNLISTED]
+
+
+def _formula_of(robot: Robot, selection: SelectionResult, unlisted: Sequence[Hypothesis]) -> str:
+    return effects_text([(h.label(robot), setting_of(selection.fit.robot, h)) for h in unlisted])

@@ -259,7 +259,7 @@ def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
 
 def _values_with_units(setting: EffectSetting) -> Iterator[str]:
     units = {parameter.name: parameter.unit for parameter in BY_NAME[setting.name].parameters}
-    return (f"{name} = {value:.4g} {units[name]}" for name, value in setting.values.items())
+    return (f"{name} = {value:.4g} {units[name]}".removesuffix(" 1") for name, value in setting.values.items())
 
 
 def _site_label(robot: Robot, formula: Formula) -> str:
