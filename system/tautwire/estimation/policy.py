@@ -127,8 +127,8 @@ class SelectionPolicy:
     # Dampings by a power of the strain rate had 58 % and 83 %.
     min_limit_evidence_ratio: float = 0.5
     # Share of the best evidence from which a nonlinear rival is looked for at other optima: a hysteresis had 1,612 nats
-    # where relaxation had 3,376, and at its own values 7,563 where that had 7,074.
-    min_rival_evidence_ratio: float = 0.4
+    # where relaxation had 3,376, and at its own values 7,563 where that had 7,074; another 26 % of 10,100, then 110 %.
+    min_rival_evidence_ratio: float = 0.2
     # Share of an effect's evidence that values of single cables have to gain: they add no name. Drums of a real robot,
     # 0.93 to 0.97, gained more than 18 and less than 36 nats of 357.
     min_cable_evidence_ratio: float = 0.05
