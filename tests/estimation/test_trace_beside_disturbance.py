@@ -107,6 +107,15 @@ def test_a_weight_without_inertia_is_a_hanging_load() -> None:
 
 
 @pytest.mark.validate
+def test_ropes_that_stiffen_are_discovered_and_not_named_after_a_modulus() -> None:
+    found = traced({"unlisted_stiffening": {"quadratic": 100.0}}, 801)
+    assert found.verdict == "discovered", found.sentence
+    assert found.formula is not None and found.formula.startswith("stiffening: quadratic = ")
+    assert float(found.formula.split()[-1]) == pytest.approx(100.0, rel=0.05)
+    assert found.effects == ()
+
+
+@pytest.mark.validate
 def test_load_cells_that_are_all_off_alike_are_no_hanging_load() -> None:
     found = traced({"sensor_offset": {"force": 30.0}}, 801)
     assert found.verdict == "effects", found.sentence
