@@ -48,6 +48,7 @@ def judged(hidden: dict[str, Any], chosen: list[Hypothesis], beside_disturbance:
     return replace_by_confusable_models(context, found)[1]
 
 
+@pytest.mark.validate
 def test_a_softer_rope_keeps_its_name() -> None:
     softer = [Hypothesis(BY_NAME["modulus"], (1, 2))]
     assert list(judged(SOFTER, softer).accepted) == softer

@@ -40,5 +40,5 @@ STIFFENING = Effect(
     values=Values,
     forms=(("quadratic",),),
     tension=tension,
-    source="a stress-strain curve to its second order, as Feyrer (2015), Wire Ropes, 2nd ed., ch. 2, has for strands",
+    source="a stress-strain curve to second order; of wire ropes: Feyrer (2015), Wire Ropes, 2nd ed., ch. 2",
 )
