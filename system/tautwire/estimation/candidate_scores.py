@@ -88,6 +88,15 @@ def misfitted_rival(
     return rival if rival and rival.evidence >= policy.min_rival_evidence_ratio * best.evidence else None
 
 
+def simpler_rival(
+    best: CandidateScore, scores: Collection[CandidateScore], policy: SelectionPolicy
+) -> CandidateScore | None:
+    """Strongest candidate of fewer parameters than the best one, if it comes near it."""
+    simpler = [score for score in scores if score.parameter_count < best.parameter_count]
+    rival = max(simpler, key=lambda score: score.evidence, default=None)
+    return rival if rival and rival.evidence >= policy.min_simpler_evidence_ratio * best.evidence else None
+
+
 def _complexity(trial: CandidateScore) -> tuple[int, bool, float]:
     return trial.parameter_count, trial.hypothesis.effect in UNLISTED, -trial.evidence
 

@@ -15,7 +15,7 @@ from .candidate_fits import (
     maximised_validation_likelihood,
 )
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
-from .candidate_scores import CandidateScore, misfitted_rival, most_parsimonious, unfitted_score
+from .candidate_scores import CandidateScore, misfitted_rival, most_parsimonious, simpler_rival, unfitted_score
 from .disturbance_posterior import disturbance_prior
 from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
@@ -107,14 +107,18 @@ def _refitted_beside_own_disturbance(
 ) -> dict[Hypothesis, CandidateScore]:
     """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
 
-    Only where the best of them on FIT is not established, or not the most parsimonious on CHECK: under the disturbance
-    of a model without it, which had to be large, an effect that explains nearly all may be fitted badly.
+    Only where the best of them on FIT is not established, or not the most parsimonious on CHECK, or in the first round
+    has a simpler rival: under the disturbance of a model without it, which had to be large, an effect that explains
+    nearly all may be fitted badly.
     """
     estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
     ranked = sorted(scores, key=lambda h: -scores[h].explained)
     best = most_parsimonious(list(scores.values()), context.policy.selection, has_disturbance=True)
-    if best is None or (best.hypothesis == ranked[0] and best.evidence >= context.evidence_threshold()):
-        return {}
+    if best and best.hypothesis == ranked[0] and best.evidence >= context.evidence_threshold():
+        rival = None if accepted else simpler_rival(best, scores.values(), context.policy.selection)
+        if rival is None:
+            return {}
+        ranked = [best.hypothesis, rival.hypothesis]
     tasks = {
         h: FitTask(tuple(with_hypothesis(accepted, h)), (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
         for h in ranked[: context.policy.selection.always_refitted]
