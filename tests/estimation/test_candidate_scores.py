@@ -111,7 +111,7 @@ def test_of_those_alike_one_of_the_list_is_taken() -> None:
 
 def test_a_rival_that_may_be_misfitted_is_nonlinear_strong_and_of_another_effect() -> None:
     fit, policy = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0))), SelectionPolicy()
-    evidences = {"relaxation": 1000.0, "modulus": 900.0, "hysteresis": 410.0, "slack": 390.0}
+    evidences = {"relaxation": 1000.0, "modulus": 900.0, "hysteresis": 210.0, "slack": 190.0}
     scores = [CandidateScore(Hypothesis(BY_NAME[name], (1, 2, 3)), fit, e, 1.0) for name, e in evidences.items()]
     relaxation, _, hysteresis, slack = scores
     assert misfitted_rival(relaxation, scores, policy) is hysteresis

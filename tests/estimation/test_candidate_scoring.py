@@ -41,16 +41,24 @@ def test_a_coarse_baseline_is_made_exact_where_it_decides(
 
 
 @pytest.mark.parametrize(
-    ("best_on_fit", "evidence", "is_refitted"),
+    ("best_on_fit", "evidence", "accepted", "is_refitted"),
     [
-        ("payload", {"payload": 950.0, "relaxation": 1000.0}, False),
-        ("relaxation", {"payload": 950.0, "relaxation": 1000.0}, True),
-        ("payload", {"payload": 950.0, "drag": 2000.0}, True),
-        ("payload", {"payload": 3.0, "drag": 2.0}, True),
+        ("payload", {"payload": 950.0, "relaxation": 1000.0}, (), False),
+        ("relaxation", {"payload": 950.0, "relaxation": 1000.0}, (), True),
+        ("payload", {"payload": 950.0, "drag": 2000.0}, (), True),
+        ("payload", {"payload": 3.0, "drag": 2.0}, (), True),
+        ("relaxation", {"relaxation": 1000.0, "payload": 600.0}, (), True),
+        ("relaxation", {"relaxation": 1000.0, "payload": 600.0}, (Hypothesis(BY_NAME["sag"], (1,)),), False),
+        ("relaxation", {"relaxation": 1000.0, "payload": 400.0}, (), False),
+        ("payload", {"relaxation": 600.0, "payload": 1000.0}, (), False),
     ],
 )
-def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_the_best(
-    best_on_fit: str, evidence: dict[str, float], is_refitted: bool, monkeypatch: pytest.MonkeyPatch
+def test_candidates_get_own_disturbances_unless_fit_and_check_agree_on_the_best_without_a_simpler_rival(
+    best_on_fit: str,
+    evidence: dict[str, float],
+    accepted: tuple[Hypothesis, ...],
+    is_refitted: bool,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     robot, recording = example("three"), recorded("three", 1)
     noise = estimate_noise(robot, recording)
@@ -63,7 +71,7 @@ def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_
         fit = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
         scores[hypothesis] = CandidateScore(hypothesis, fit, nats, 1.0, explained=float(name == best_on_fit))
     monkeypatch.setattr(candidate_scoring, "fit_candidates", lambda _, __, tasks, *___: refitted.extend(tasks) or {})
-    candidate_scoring._refitted_beside_own_disturbance(context, "round 1", (), scores, 0.0)
+    candidate_scoring._refitted_beside_own_disturbance(context, "round 1", accepted, scores, 0.0)
     assert [each.effect.name for each in refitted] == ([best_on_fit, *(set(evidence) - {best_on_fit})] * is_refitted)
 
 
