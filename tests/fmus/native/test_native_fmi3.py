@@ -6,11 +6,13 @@ import io
 import shutil
 import subprocess
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 from PIL import Image
@@ -82,30 +84,71 @@ def test_the_master_gets_the_same_bits_from_either_version(both_versions: tuple[
     assert np.array_equal(one, other)
 
 
-def test_a_serialised_state_goes_on_in_another_instance(
-    both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path
-) -> None:
-    path = both_versions[1].cables[0]
-    fmpy.extract(str(path), str(tmp_path))
+def extracted(path: Path, folder: Path) -> tuple[Callable[[], FMU3Slave], dict[str, int]]:
+    """What makes instances of an FMU, and its value references."""
+    fmpy.extract(str(path), str(folder))
     description = fmpy.read_model_description(str(path))
-    references = {variable.name: variable.valueReference for variable in description.modelVariables}
-    shown = [references[name] for name in ("tension", "effect.hysteresis.memory", "time")]
 
     def instance() -> FMU3Slave:
         name = description.coSimulation.modelIdentifier
-        fmu = FMU3Slave(guid=description.guid, unzipDirectory=str(tmp_path), modelIdentifier=name)
+        fmu = FMU3Slave(guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name)
         fmu.instantiate()
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
         return fmu
 
-    first = instance()
+    return instance, {variable.name: variable.valueReference for variable in description.modelVariables}
+
+
+def running(instance: Callable[[], FMU3Slave]) -> FMU3Slave:
+    fmu = instance()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    return fmu
+
+
+def test_calls_are_allowed_in_their_states_only(both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path) -> None:
+    instance, _ = extracted(both_versions[1].platform, tmp_path)
+    fmu = instance()
+    for call in (fmu.exitInitializationMode, fmu.terminate, lambda: fmu.doStep(0.0, 0.01)):
+        with pytest.raises(FMICallException):
+            call()
+    fmu.enterInitializationMode()
+    with pytest.raises(FMICallException):
+        fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, 0.01)
+    fmu.terminate()
+    with pytest.raises(FMICallException):
+        fmu.doStep(0.01, 0.01)
+    fmu.reset()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    fmu.doStep(0.0, 0.01)
+
+
+def test_time_is_that_of_the_state(both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path) -> None:
+    instance, references = extracted(both_versions[1].cables[0], tmp_path)
+    first, second = running(instance), running(instance)
+    first.doStep(0.0, 0.01)
+    saved = first.getFMUState()
+    first.doStep(0.01, 0.01)
+    assert first.getFloat64([references["time"]]) == [0.02]
+    first.setFMUState(saved)
+    second.setFMUState(second.deserializeFMUState(first.serializeFMUState(saved)))
+    assert [fmu.getFloat64([references["time"]]) for fmu in (first, second)] == [[0.01], [0.01]]
+
+
+def test_a_serialised_state_goes_on_in_another_instance(
+    both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path
+) -> None:
+    instance, references = extracted(both_versions[1].cables[0], tmp_path)
+    shown = [references[name] for name in ("tension", "effect.hysteresis.memory", "time")]
+    first = running(instance)
     first.setFloat64([references["winch_speed"]], [0.3])
     first.doStep(0.0, 0.01)
     content = first.serializeFMUState(first.getFMUState())
     first.doStep(0.01, 0.01)
     expected = first.getFloat64(shown)
-    second = instance()
+    second = running(instance)
     state = second.deserializeFMUState(content)
     second.setFMUState(state)
     second.doStep(0.01, 0.01)

@@ -23,8 +23,11 @@ from tests.support.native import both_kinds, both_runs, largest_difference
 from tests.support.robots import LIMITED, example, gentle_speeds, paper_robot, with_winch
 
 SAME = 1e-10
+# Of a rope that sticks and slips: rounding moves the instant at which it does, by a processor's own arithmetic.
+SAME_WITH_FRICTION = 1e-8
 DELAYED = same("sensor_delay", tension_delay=0.023)
 FMI_DISCARD, FMI_ERROR = 2, 3
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of fmi2StatusKind
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +79,8 @@ def test_all_effects_together_run_as_in_python(complete_fmus: tuple[RobotFmus, R
 def test_each_effect_runs_as_in_python(cases: tuple[Case, ...], tmp_path: Path) -> None:
     time, speed = gentle_speeds(example("three"), 1.0, 0.02)
     python, native = both_runs(with_effects(example("three"), *cases), tmp_path, time, speed)
-    assert largest_difference(python, native) < SAME
+    has_friction = any(case.name == "friction" for case in cases)
+    assert largest_difference(python, native) < (SAME_WITH_FRICTION if has_friction else SAME)
 
 
 def go_on(cable: Hand) -> list[float]:
@@ -136,6 +140,50 @@ def test_a_rope_reeled_in_past_its_end_discards_the_step_and_keeps_the_state(pla
             cable.step(0.0, 0.01)
         assert caught.value.status == FMI_DISCARD
         assert cable.get("unstrained_length", "wound_length") == [-1.0, 0.0]
+
+
+def test_calls_are_allowed_in_their_states_only(plain_fmus: RobotFmus) -> None:
+    with in_hand(plain_fmus.cables[0]) as cable:
+        for call in (lambda: cable.step(0.0, 0.01), cable.fmu.terminate, cable.fmu.enterInitializationMode):
+            with pytest.raises(FMICallException):
+                call()
+        cable.run()
+        with pytest.raises(FMICallException):
+            cable.run()
+        cable.step(0.0, 0.01)
+        cable.fmu.terminate()
+        with pytest.raises(FMICallException):
+            cable.step(0.01, 0.01)
+
+
+def test_after_a_discarded_step_the_end_of_the_last_good_one_is_known(plain_fmus: RobotFmus) -> None:
+    with in_hand(plain_fmus.cables[0]) as cable:
+        cable.run()
+        cable.step(0.0, 0.01)
+        cable.set(winch_speed=1e6)
+        with pytest.raises(FMICallException) as caught:
+            cable.step(0.01, 0.01)
+        assert caught.value.status == FMI_DISCARD
+        assert cable.fmu.getRealStatus(LAST_SUCCESSFUL_TIME) == 0.01
+        with pytest.raises(FMICallException) as caught:
+            cable.fmu.getBooleanStatus(TERMINATED)
+        assert caught.value.status == FMI_DISCARD
+        cable.set(winch_speed=0.0)
+        cable.step(0.01, 0.01)
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_inputs_without_an_answer_leave_what_the_last_step_gave(
+    complete_fmus: tuple[RobotFmus, RobotFmus], kind: int
+) -> None:
+    with in_hand(complete_fmus[kind].cables[1]) as cable:
+        begin(cable)
+        expected = cable.get("position.x", "force.x", "middle_force.x")
+        cable.set(position__x=float("nan"))
+        tension, middle = cable.get("force.x", "middle_force.x")
+        assert np.isnan(tension) and middle == expected[2]
+        cable.set(position__x=expected[0])
+        assert cable.get("force.x", "middle_force.x") == expected[1:]
 
 
 def test_parameters_outside_their_bounds_and_inputs_not_finite_are_refused(plain_fmus: RobotFmus) -> None:

@@ -2,11 +2,8 @@
 
 #include "fmi2Functions.h"
 
-typedef enum { INSTANTIATED, INITIALIZATION, STEPPING } Phase;
-
 typedef struct {
   Slave slave;
-  Phase phase;
   fmi2CallbackLogger logger;
   fmi2ComponentEnvironment environment;
   fmi2Boolean logging_on;
@@ -68,32 +65,36 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
                                fmi2Boolean has_stop, fmi2Real stop) {
   Instance *instance = (Instance *)c;
   (void)has_stop, (void)stop;
+  if (!is_allowed(&instance->slave, INSTANTIATED, "fmi2SetupExperiment")) return fmi2Error;
   instance->slave.state.time = start;
   if (has_tolerance) set_tolerance(&instance->slave, tolerance);
   return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
-  ((Instance *)c)->phase = INITIALIZATION;
+  Slave *slave = &((Instance *)c)->slave;
+  if (!is_allowed(slave, INSTANTIATED, "fmi2EnterInitializationMode")) return fmi2Error;
+  slave->phase = INITIALIZATION;
   return fmi2OK;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
-  Instance *instance = (Instance *)c;
-  if (check_inputs(&instance->slave) != STATUS_OK) return fmi2Error;
-  instance->phase = STEPPING;
+  Slave *slave = &((Instance *)c)->slave;
+  if (!is_allowed(slave, INITIALIZATION, "fmi2ExitInitializationMode") || check_inputs(slave) != STATUS_OK)
+    return fmi2Error;
+  slave->phase = STEPPING;
   return fmi2OK;
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
-  (void)c;
+  Slave *slave = &((Instance *)c)->slave;
+  if (!is_allowed(slave, STEPPING, "fmi2Terminate")) return fmi2Error;
+  slave->phase = TERMINATED;
   return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-  Instance *instance = (Instance *)c;
-  reset_slave(&instance->slave);
-  instance->phase = INSTANTIATED;
+  reset_slave(&((Instance *)c)->slave);
   return fmi2OK;
 }
 
@@ -214,33 +215,35 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean no_rollback) {
   Instance *instance = (Instance *)c;
   (void)no_rollback;
-  if (instance->phase != STEPPING) return refuse(instance, "a step before the end of initialization");
+  if (!is_allowed(&instance->slave, STEPPING, "fmi2DoStep")) return fmi2Error;
   return (fmi2Status)do_step(&instance->slave, time, step);
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse((Instance *)c, "no step is pending"); }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
-  (void)kind, (void)value;
-  return refuse((Instance *)c, "no step is pending");
+/* What is known after a step that was discarded: the end of the last one that was not. */
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+  if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
+  *value = ((Instance *)c)->slave.state.time;
+  return fmi2OK;
 }
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-  (void)kind, (void)value;
-  return refuse((Instance *)c, "no step is pending");
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+  (void)c, (void)kind, (void)value;
+  return fmi2Discard;
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
-  (void)kind, (void)value;
-  return refuse((Instance *)c, "no step is pending");
+  (void)c, (void)kind, (void)value;
+  return fmi2Discard;
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-  (void)kind, (void)value;
-  return refuse((Instance *)c, "no step is pending");
+  (void)c, (void)kind, (void)value;
+  return fmi2Discard;
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
-  (void)kind, (void)value;
-  return refuse((Instance *)c, "no step is pending");
+  (void)c, (void)kind, (void)value;
+  return fmi2Discard;
 }

@@ -6,8 +6,6 @@
 
 typedef struct {
   Slave slave;
-  double now;
-  int is_initialized;
   fmi3LogMessageCallback log;
   fmi3InstanceEnvironment environment;
   fmi3Boolean logging_on;
@@ -64,30 +62,32 @@ void fmi3FreeInstance(fmi3Instance c) {
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop) {
-  Instance3 *instance = (Instance3 *)c;
+  Slave *slave = &((Instance3 *)c)->slave;
   (void)has_stop, (void)stop;
-  instance->now = instance->slave.state.time = start;
-  if (has_tolerance) set_tolerance(&instance->slave, tolerance);
+  if (!is_allowed(slave, INSTANTIATED, "fmi3EnterInitializationMode")) return fmi3Error;
+  slave->state.time = start;
+  slave->phase = INITIALIZATION;
+  if (has_tolerance) set_tolerance(slave, tolerance);
   return fmi3OK;
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-  Instance3 *instance = (Instance3 *)c;
-  if (check_inputs(&instance->slave) != STATUS_OK) return fmi3Error;
-  instance->is_initialized = 1;
+  Slave *slave = &((Instance3 *)c)->slave;
+  if (!is_allowed(slave, INITIALIZATION, "fmi3ExitInitializationMode") || check_inputs(slave) != STATUS_OK)
+    return fmi3Error;
+  slave->phase = STEPPING;
   return fmi3OK;
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c) {
-  (void)c;
+  Slave *slave = &((Instance3 *)c)->slave;
+  if (!is_allowed(slave, STEPPING, "fmi3Terminate")) return fmi3Error;
+  slave->phase = TERMINATED;
   return fmi3OK;
 }
 
 fmi3Status fmi3Reset(fmi3Instance c) {
-  Instance3 *instance = (Instance3 *)c;
-  reset_slave(&instance->slave);
-  instance->is_initialized = 0;
-  instance->now = 0.0;
+  reset_slave(&((Instance3 *)c)->slave);
   return fmi3OK;
 }
 
@@ -100,7 +100,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[],
     ;
   if (k == count) return (fmi3Status)get_variables(&instance->slave, references, count, values);
   for (k = 0; k < count; k++) {
-    values[k] = instance->now;
+    values[k] = instance->slave.state.time;
     if (references[k] != TIME_REFERENCE && get_variables(&instance->slave, references + k, 1, values + k)) return fmi3Error;
   }
   return fmi3OK;
@@ -193,9 +193,9 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Bo
   (void)no_rollback;
   *event_needed = *terminate = *early_return = fmi3False;
   *last_time = time;
-  if (!instance->is_initialized) return refuse(c, "a step before the end of initialization");
+  if (!is_allowed(&instance->slave, STEPPING, "fmi3DoStep")) return fmi3Error;
   status = do_step(&instance->slave, time, step);
-  if (status == STATUS_OK) *last_time = instance->now = time + step;
+  if (status == STATUS_OK) *last_time = instance->slave.state.time;
   return (fmi3Status)status;
 }
 

@@ -37,9 +37,20 @@ static void reset_slave(Slave *slave) {
   free_delay_line(&slave->delay_line);
   memset(&slave->state, 0, sizeof slave->state);
   memcpy(slave->state.real, model_start, sizeof slave->state.real);
+  slave->phase = INSTANTIATED;
   slave->relative_tolerance = RELATIVE_TOLERANCE;
   slave->outputs_stale = 1;
   parameters_changed(slave);
+}
+
+static int is_allowed(const Slave *slave, Phase phase, const char *call) {
+  static const char *const names[] = {"instantiated", "initialization", "stepping", "terminated"};
+  char message[200];
+  if (slave->phase == phase) return 1;
+  snprintf(message, sizeof message, "%s in the state %s: allowed in the state %s only", call, names[slave->phase],
+           names[phase]);
+  log_message(slave, STATUS_ERROR, message);
+  return 0;
 }
 
 static void set_tolerance(Slave *slave, double tolerance) {
@@ -92,14 +103,20 @@ static int set_variables(Slave *slave, const unsigned int *references, size_t co
   return STATUS_OK;
 }
 
-/* Computes the outputs; where the law has no value for the inputs, all become NaN. */
+/* Values in the middle of the last step, which no inputs of now change. */
+static int is_of_last_step(const Slave *slave, int reference) {
+  return slave->state.started && !strncmp(variable_names[reference], "middle_", 7);
+}
+
+/* Computes the outputs; where the law has no value for the inputs, all that depend on them become NaN. */
 static void refresh_outputs(Slave *slave) {
   int k;
   if (!slave->outputs_stale) return;
   slave->outputs_stale = 0;
   if (slave->parameters_valid && refresh(slave)) return;
   for (k = 0; k < VARIABLE_COUNT; k++)
-    if (is_output[k] && (k < FIRST_STATE || k >= FIRST_STATE + STATE_COUNT)) slave->state.real[k] = NAN;
+    if (is_output[k] && !is_of_last_step(slave, k) && (k < FIRST_STATE || k >= FIRST_STATE + STATE_COUNT))
+      slave->state.real[k] = NAN;
   log_with_inputs(slave, STATUS_WARNING, "no outputs: the law has no value");
 }
 
@@ -157,6 +174,7 @@ static int do_step(Slave *slave, double time, double step) {
   }
   free_delay_line(&delay_before);
   state->started = 1;
+  state->time = time + step;
   state->elapsed = at_end ? 0.0 : step;
   return STATUS_OK;
 }

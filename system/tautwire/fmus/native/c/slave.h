@@ -9,11 +9,15 @@ typedef struct {
   int32_t started;
 } State;
 
+/* The states of FMI's co-simulation that tell which calls are allowed. */
+typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED } Phase;
+
 typedef void (*Log)(void *owner, int status, const char *message);
 
 typedef struct {
   State state;
   DelayLine delay_line;
+  Phase phase;
   double start[START_SIZE];
   double relative_tolerance;
   int parameters_valid;
