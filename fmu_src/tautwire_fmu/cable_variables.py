@@ -2,7 +2,7 @@
 
 from typing import Any, Dict, Optional, Tuple
 
-from .effect_variables import effect_state_variables, effect_variables
+from .effect_variables import effect_state_variables, effect_variables, effects_from_resource
 from .model_description import Variable, axis_names, vector_variables
 from .slave import INPUT_TIME, MIDDLE_TIME
 
@@ -42,6 +42,8 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     tension, length = float(data["start_tension"]) or None, float(data["start_length"])
     load_cell_text = "tension at the load cell, between winch and exit point"
     length_text = "rope from exit point to platform, as if it did not sag"
+    # A load cell with a zero of its own may show less than none.
+    minimum = None if any(effect.name == "sensor_offset" for effect in effects_from_resource(data)) else 0.0
     elongation_text = "length less start length and rope let out"
     pull_text = "tension that the law asks for, negative where the cable hangs slack"
     position_inputs = axis_names("position")
@@ -49,7 +51,7 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         *vector_variables(
             Variable("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION_INPUTS)
         ),
-        Variable("tension", "output", "N", load_cell_text, minimum=0.0, nominal=tension, depends_on=MOTION_INPUTS),
+        Variable("tension", "output", "N", load_cell_text, minimum=minimum, nominal=tension, depends_on=MOTION_INPUTS),
         Variable("length", "output", "m", length_text, nominal=length, depends_on=position_inputs),
         Variable("elongation", "output", "m", elongation_text, depends_on=position_inputs),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=position_inputs),

@@ -1,6 +1,6 @@
 """FMI variables that the platforms of all kinds share."""
 
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
 from .effect_variables import effects_from_resource
 from .model_description import Variable, vector_variables
@@ -15,7 +15,8 @@ def has_position_sensor(data: Dict[str, Any]) -> bool:
 
 def force_variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     """Forces and their rates at the end of a step, then those of the cables in its middle."""
-    weight = float(data["mass"]) * float(data["gravity"])
+    # A nominal value is never zero, as the weight of a platform on a table would be.
+    weight = float(data["mass"]) * float(data["gravity"]) or None
     cable_forces = tuple(
         (f"_{number}", f"force of cable {number}", tuple(force))
         for number, force in enumerate(data["start_forces"], start=1)
@@ -33,7 +34,7 @@ def force_variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
 
 
 def _force_inputs(
-    name: str, rate_name: str, description: str, start: Tuple[float, float, float], weight: float
+    name: str, rate_name: str, description: str, start: Tuple[float, float, float], weight: Optional[float]
 ) -> Tuple[Variable, ...]:
     return (
         *vector_variables(Variable(name, "input", "N", description, nominal=weight), start),

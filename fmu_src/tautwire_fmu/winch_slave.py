@@ -151,7 +151,13 @@ def _outputs(data: Dict[str, Any]) -> Sequence[Variable]:
             f"limit of acceleration less acceleration asked for{event_text}",
             depends_on=command,
         ),
-        Variable("speed_margin", "output", "m/s", f"speed to where another limit bounds the acceleration{event_text}"),
+        Variable(
+            "speed_margin",
+            "output",
+            "m/s",
+            f"speed to where another limit bounds the acceleration{event_text}",
+            depends_on=command,
+        ),
         Variable("winch_speed", "output", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("integral", "local", "m/s2", "state: integral part of the speed loop, as acceleration of the rope"),
     )

@@ -51,7 +51,7 @@ def three() -> Robot:
 
 @pytest.fixture(scope="module")
 def three_example_fmus(three: Robot, tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
-    return build_fmus(three, tmp_path_factory.mktemp("three"))
+    return build_fmus(three, tmp_path_factory.mktemp("three"), native=True)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def difference(
     fmu = build_controller_fmu(robot, design, path, DURATION, folder)
     other = cosimulate_with_controller(fmus, fmu, times, RunOptions(external_force=force))
     assert np.max(np.abs(own.position - own.position[0])) > 0.3
-    assert other.tension == pytest.approx(own.tension, abs=1e-5)
+    assert other.tension == pytest.approx(own.tension, abs=1e-4)
     return float(np.max(np.abs(own.position - other.position)))
 
 
@@ -87,7 +87,8 @@ def difference(
 @pytest.mark.parametrize("name", sorted(PATHS))
 def test_lqg_gives_the_same_numbers_as_fmu(name: str, tmp_path: Path) -> None:
     robot = example(name)
-    assert difference(robot, build_fmus(robot, tmp_path), design_controller(robot), tmp_path, pushed=True) < 1e-9
+    fmus = build_fmus(robot, tmp_path, native=True)
+    assert difference(robot, fmus, design_controller(robot), tmp_path, pushed=True) < 1e-9
 
 
 @pytest.mark.validate
@@ -106,7 +107,7 @@ def test_shaped_path_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_pa
 @pytest.mark.validate
 def test_robust_controllers_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     assert difference(three, three_example_fmus, design_robust(three), tmp_path, pushed=True) < 1e-9
-    scheduled = schedule_robust(three, PATHS["three"], points=3)
+    scheduled = schedule_robust(three, PATHS["three"], points=2)
     assert difference(three, three_example_fmus, scheduled, tmp_path, pushed=True) < 1e-9
 
 
@@ -118,14 +119,14 @@ def test_limits_act_alike(three: Robot, three_example_fmus: RobotFmus, tmp_path:
 
 @pytest.mark.validate
 def test_payload_that_nobody_declared_is_tared_alike(three: Robot, tmp_path: Path) -> None:
-    fmus = build_fmus(robot_with(three, 1.2e11, 0.8), tmp_path)
+    fmus = build_fmus(robot_with(three, 1.2e11, 0.8), tmp_path, native=True)
     assert difference(three, fmus, design_controller(three), tmp_path) < 1e-9
 
 
 @pytest.mark.validate
 def test_winches_are_asked_for_the_same_speeds(three: Robot, tmp_path: Path) -> None:
     robot = with_winch(three, LIMITED)
-    assert difference(robot, build_fmus(robot, tmp_path), design_controller(robot), tmp_path) < 1e-9
+    assert difference(robot, build_fmus(robot, tmp_path, native=True), design_controller(robot), tmp_path) < 1e-9
 
 
 def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmus, controller: Path) -> None:

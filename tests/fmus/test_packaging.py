@@ -71,7 +71,7 @@ def test_outputs_name_the_inputs_that_act_without_delay(three_fmus: RobotFmus, w
     assert {u.variable.name: [known.name for known in u.dependencies] for u in winch} == {
         "winch_speed": [],
         "motor_speed": [],
-        "speed_margin": [],
+        "speed_margin": ["speed_command"],
         "winch_acceleration": ["speed_command"],
         "command_margin": ["speed_command"],
         "acceleration_margin": ["speed_command"],
