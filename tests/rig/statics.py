@@ -7,6 +7,9 @@ from scipy import optimize
 
 from tests.rig.robot import TensionLimits, Vector
 
+# Of the load: how far below zero rounding puts the tension of a rope that is just slack.
+SLACK_TOLERANCE = 1e-12
+
 
 def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> Vector:
     """Tensions T with sum T_i u_i = -load, N; `directions` holds u_i by rows, `load` in N.
@@ -22,9 +25,9 @@ def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> V
         tensions = np.linalg.solve(within.T, -wanted)
     else:
         tensions = nearest_to_preferred(within, wanted, limits)
-    if np.any(tensions <= 0):
-        raise ValueError(f"not every cable pulls at the start: {tensions} N")
-    return tensions
+    if np.any(tensions < -SLACK_TOLERANCE * np.linalg.norm(load)):
+        raise ValueError(f"a cable would have to push at the start: {tensions} N")
+    return np.maximum(tensions, 0.0)
 
 
 def holds(matrix: Vector, load: Vector) -> bool:

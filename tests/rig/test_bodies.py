@@ -54,6 +54,7 @@ def test_filling_tank_weighs_down_and_is_carried_along() -> None:
     assert late == pytest.approx([0.0, 0.0, -20.0 * 9.8 / 320.0])
 
 
+@pytest.mark.validate
 def test_stiff_frame_gives_way_by_tension_over_stiffness() -> None:
     effects = {"unlisted_frame": {"stiffness_constant": 1e5, "viscosity": 2e3}}
     program = wander(paper_robot(), 4, 5.0, shake=0.0, slow=(15.0, 30.0))

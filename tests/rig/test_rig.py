@@ -92,7 +92,7 @@ def test_eight_start_tensions_are_in_equilibrium_within_limits_and_nearest_to_pr
 
 def test_start_where_a_cable_would_push_is_refused() -> None:
     outside = replace(paper_robot(), start=np.array([-30.0, 0.0, 5.0]))
-    with pytest.raises(ValueError, match="not every cable pulls"):
+    with pytest.raises(ValueError, match="a cable would have to push"):
         simulate(outside, {}, StillProgram(3), [0.0])
 
 

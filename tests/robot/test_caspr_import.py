@@ -148,6 +148,12 @@ def test_what_is_assumed_or_left_out_is_told(tmp_path: Path) -> None:
         ("", cables("cable_vsd_torsion_spring"), None, "is a cable_vsd_torsion_spring"),
         ("", cables(more=attachment(1, (0.0, 0.0, 0.0))), None, "cable '1' has 3 attachments"),
         ("", "", "pulleys", "no cable set 'pulleys'; choose among original, spare"),
+        ("", "", "spare", "its cable set is empty"),
+        ("", cables("muscle_hill_type"), None, "is a muscle_hill_type"),
+        (bodies(joint="SPATIAL_QUATERNION", pose="0 0 1 0 0 0 0"), "", None, "<q_initial> has only zeros"),
+        ("", cables(pulleys=True).replace("0 0 2", "0 0 0"), None, "<cable_entry_vector> has only zeros"),
+        (bodies().replace(f"<mass>{MASS}", "<mass>0"), "", None, "platform.mass: is 0"),
+        ("", cables().replace("1011", "5"), None, "tension"),
     ],
 )
 def test_what_no_robot_file_can_have_is_refused(

@@ -70,3 +70,11 @@ def test_open_numbers_are_not_written(tmp_path: Path) -> None:
     robot = replace(ROBOT, formulas=(Formula("force_x", "c1*vx", (), {"c1": 2.0}),))
     with pytest.raises(RobotFileError):
         write_robot(robot, tmp_path / "robot.toml")
+
+
+@pytest.mark.parametrize("text", ["-20*vx/sqrt(vx**2 + vy**2)", "log(vx)", "1/(x - 28.86)"])
+def test_a_force_without_a_value_at_the_start_at_rest_is_refused(text: str, tmp_path: Path) -> None:
+    """Statics and co-simulation would divide by zero."""
+    assert ROBOT.platform.start[0] == 28.86
+    with pytest.raises(RobotFileError, match=r"formula\.force_x: .* has no value at the start, at rest"):
+        with_table(tmp_path, f'[formula]\nforce_x = "{text}"')

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tautwire.errors import ArgumentError
+from tautwire.errors import ArgumentError, InputError
+from tautwire.linear import linearise
 from tautwire.robot.cable_routes import unit_directions
 from tautwire.robot.kinematics import forward_kinematics, inverse_kinematics, length_jacobian, structure_matrix
 from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.static_pose import static_pose
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 from tests.support.robots import example
 
@@ -108,6 +111,18 @@ def test_too_few_lengths_are_refused() -> None:
     robot = suspended_robot(4)
     with pytest.raises(ArgumentError, match="do not determine 6 degrees of freedom"):
         forward_kinematics(robot, inverse_kinematics(robot))
+
+
+@pytest.mark.parametrize(
+    "at_pose",
+    [structure_matrix, inverse_kinematics, static_pose, lambda robot, at, q: linearise(robot, at, orientation=q)],
+)
+def test_a_point_mass_that_is_to_turn_is_refused(at_pose: Callable[..., object]) -> None:
+    robot = example("three")
+    for unturned in ((1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0)):
+        at_pose(robot, robot.platform.start, unturned)
+    with pytest.raises(InputError, match="point mass, which does not turn"):
+        at_pose(robot, robot.platform.start, (0.8, 0.6, 0.0, 0.0))
 
 
 def test_invalid_poses_are_refused() -> None:

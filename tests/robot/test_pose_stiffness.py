@@ -83,3 +83,13 @@ def test_free_modes_of_a_real_robot_are_those_of_an_independent_program_on_its_p
     stiffness = stiffness_matrix(robot, equilibrium.tensions, None, equilibrium.orientation)
     squares = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
     assert np.sqrt(squares[:2]) / (2.0 * np.pi) == pytest.approx(frequencies, rel=2e-4)
+
+
+def test_tensions_are_those_of_the_orientation() -> None:
+    """In equilibrium it is symmetric about the centre of mass, at any pose."""
+    robot = crane_robot()
+    turned = tuple(np.roll(Rotation.from_rotvec([0.02, -0.05, 0.1]).as_quat(), 1).tolist())
+    at_pose = static_equilibrium(robot, orientation=turned)
+    expected = stiffness_matrix(robot, at_pose.tensions, orientation=turned)
+    assert stiffness_matrix(robot, orientation=turned) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+    assert expected != pytest.approx(stiffness_matrix(robot, static_equilibrium(robot).tensions, orientation=turned))

@@ -1,4 +1,5 @@
 from itertools import permutations
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -6,10 +7,12 @@ import pytest
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.robot.cable_routes import unit_directions
+from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
 from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.tension_distribution import distribute_tensions
 from tautwire.robot.workspace import wrench_feasible_workspace, wrench_margin
+from tests.support.planar import VERTICAL, robot_text
 from tests.support.robots import NAMES, example, paper_robot
 
 
@@ -113,3 +116,17 @@ def test_at_an_exit_point_there_is_nothing() -> None:
 def test_what_makes_no_grid_is_refused(arguments: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         wrench_feasible_workspace(paper_robot(), **arguments)
+
+
+def test_a_planar_robot_has_a_workspace_in_its_plane(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(robot_text(VERTICAL))
+    robot = read_robot(tmp_path / "robot.toml")
+    workspace = wrench_feasible_workspace(robot, spacing=0.2)
+    assert 0.1 < workspace.feasible.mean() < 0.95
+    assert np.array_equal(workspace.feasible, np.isfinite(workspace.min_tension))
+    start = np.array(robot.platform.start)
+    still = wrench_margin(robot, start)
+    # Two axes, each either way: one of the corners is against the face.
+    assert 0.0 < wrench_margin(robot, start, 1.0) < still
+    out_of_plane = start + [axis not in robot.axes_in_plane for axis in range(3)]
+    assert wrench_margin(robot, out_of_plane) < 0.0

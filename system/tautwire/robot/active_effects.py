@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws import rigid_body_effects as body_stages
-from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
+from tautwire_fmu.laws.effects import BY_NAME, SLACK, ActiveEffect
 from tautwire_fmu.laws.formula import formula_effect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.rigid_body import principal_axes
@@ -140,3 +144,12 @@ def _formula_effects(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
         return ()
     numbers = {name: value for formula in formulas for name, value in formula.numbers.items()}
     return (ActiveEffect(formula_effect(formula_texts(formulas), tuple(numbers)), numbers),)
+
+
+def slack_tensions(robot: Robot) -> NDArray[np.float64]:
+    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
+    tension = np.zeros(robot.cable_count)
+    for setting in robot.effects:
+        if setting.name == SLACK.name:
+            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
+    return tension

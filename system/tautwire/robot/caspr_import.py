@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..errors import InputError, UnreachableError
+from ..errors import InputError, RobotFileError, UnreachableError
+from .robot_file_reader import robot_from_text
+from .robot_file_text import robot_text
 from .schema import Cable, EffectSetting, Platform, Point, Quaternion, Robot, Sensors, TensionLimits
 from .static_equilibrium import static_tensions
 
@@ -80,7 +82,9 @@ def read_caspr_robot(folder: str | Path, cable_set: str | None = None, rope: Rop
     bodies, cables = (_parsed(source, kind) for kind in ("bodies", "cables"))
     platform, name, notes = _platform(bodies, source)
     chosen = _cable_set(cables, cable_set, source)
-    elements = [each for each in chosen if each.tag.startswith("cable")]
+    elements = list(chosen)
+    if not elements:
+        raise _error(source, "its cable set is empty", "choose another one with --cables")
     for element in elements:
         if element.tag not in CABLE_KINDS:
             raise _error(source, f"{_named(element)} is a {element.tag}", f"only {' and '.join(CABLE_KINDS)} are read")
@@ -94,7 +98,7 @@ def read_caspr_robot(folder: str | Path, cable_set: str | None = None, rope: Rop
         cables=tuple(_cable(each, element, rope, source) for each, element in zip(ends, elements, strict=True)),
         effects=_pulleys(ends),
     )
-    robot = _with_taut_cables(declared)
+    robot = _with_taut_cables(_validated(declared, source))
     return ImportedRobot(robot, (*notes, *_assumptions(elements, rope, robot), *_left_out(source, cables, chosen)))
 
 
@@ -162,7 +166,7 @@ def _start(joint: Element, kind: str, folder: Path) -> tuple[Array, Quaternion, 
     if kind == "SPATIAL_EULER_XYZ":
         x, y, z, w = Rotation.from_euler("XYZ", values[3:]).as_quat()
     else:
-        w, x, y, z = values[3:] / np.linalg.norm(values[3:])
+        w, x, y, z = _unit_vector(values[3:], "q_initial", folder)
     return values[:3], (float(w), float(x), float(y), float(z)), []
 
 
@@ -194,7 +198,7 @@ def _cable_ends(element: Element, centre: Point, folder: Path) -> _CableEnds:
         _point(_numbers(outlet, "fixed_location", 3, folder)),
         _point(attachment),
         _numbers(outlet, "pulley_radius", 1, folder)[0],
-        _point(axis / np.linalg.norm(axis)),
+        _point(_unit_vector(axis, "cable_entry_vector", folder)),
     )
 
 
@@ -226,6 +230,14 @@ def _tension_limits(elements: Sequence[Element], folder: Path) -> TensionLimits:
     low = max(_numbers(each, "properties/force_min", 1, folder)[0] for each in elements)
     high = min(_numbers(each, "properties/force_max", 1, folder)[0] for each in elements)
     return TensionLimits(float(low), float(high), float(low + PREFERRED_SHARES[0] * (high - low)))
+
+
+def _validated(robot: Robot, folder: Path) -> Robot:
+    """The robot as a robot file has it; CasprError where none can."""
+    try:
+        return robot_from_text(robot_text(robot), folder, robot.name)
+    except RobotFileError as error:
+        raise CasprError(error.where, error.problem, "correct the model, or export it again") from error
 
 
 def _with_taut_cables(robot: Robot) -> Robot:
@@ -289,6 +301,13 @@ def _parsed_numbers(text: str, count: int, where: str, folder: Path) -> Array:
     if len(values) != count or not np.all(np.isfinite(values)):
         raise _error(folder, f"<{where}> is {text.strip()[:60]!r}", f"give {count} finite numbers")
     return values
+
+
+def _unit_vector(values: Array, where: str, folder: Path) -> Array:
+    length = float(np.linalg.norm(values))
+    if not length:
+        raise _error(folder, f"<{where}> has only zeros", "give a direction or a rotation")
+    return values / length
 
 
 def _point(values: Array) -> Point:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isfinite
 
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
-from tautwire_fmu.laws.expression import expression_errors
-from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
+from tautwire_fmu.laws.expression import evaluate, expression_errors, parse_expression
+from tautwire_fmu.laws.formula import FORCE_TARGETS, PLATFORM_VARIABLES, VARIABLES_BY_TARGET
+from tautwire_fmu.laws.mathematics import REAL
 
 from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
 from .checked_table import CheckedTable
 from .platform_reader import refuse_keys_of_rigid_bodies
-from .schema import PER_CABLE_COMPONENTS, EffectSetting, Formula
+from .schema import AXES, PER_CABLE_COMPONENTS, EffectSetting, Formula, Point
 
 
 def read_effects(table: CheckedTable, cable_count: int, is_rigid: bool) -> tuple[EffectSetting, ...]:
@@ -85,7 +87,9 @@ def read_cable_list(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
     return tuple(sorted(cable_numbers))
 
 
-def read_formulas(root: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]]) -> tuple[Formula, ...]:
+def read_formulas(
+    root: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]], start: Point
+) -> tuple[Formula, ...]:
     """Reads ``[formula]`` or ``[[formula]]`` of a robot file, if any; ``cable_reader`` returns the cables of a table.
 
     Raises RobotFileError.
@@ -93,11 +97,15 @@ def read_formulas(root: CheckedTable, cable_reader: Callable[[CheckedTable], tup
     if "formula" not in root.content:
         return ()
     return tuple(
-        formula for table in root.table_or_tables("formula") for formula in _read_formula_table(table, cable_reader)
+        formula
+        for table in root.table_or_tables("formula")
+        for formula in _read_formula_table(table, cable_reader, start)
     )
 
 
-def _read_formula_table(table: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]]) -> list[Formula]:
+def _read_formula_table(
+    table: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]], start: Point
+) -> list[Formula]:
     table.require_known((*VARIABLES_BY_TARGET, "cables"))
     targets = [target for target in VARIABLES_BY_TARGET if target in table.content]
     if not targets:
@@ -109,7 +117,19 @@ def _read_formula_table(table: CheckedTable, cable_reader: Callable[[CheckedTabl
         text = table.text(target, 'write it as text, as in "-20 * vx"')
         if text is None:
             continue
-        for error in expression_errors(text, VARIABLES_BY_TARGET[target]):
+        errors = expression_errors(text, VARIABLES_BY_TARGET[target])
+        for error in errors:
             table.refuse(target, f"character {error.position}: {error.problem}", error.hint)
+        if target in FORCE_TARGETS and not errors and not _has_value_at_rest(text, start):
+            hint = "keep it finite where nothing moves, as in -20*vx/sqrt(vx**2 + 1e-6)"
+            table.refuse(target, f"{text!r} has no value at the start, at rest", hint)
         formulas.append(Formula(target, text, cable_reader(table) if target == "tension" else ()))
     return formulas
+
+
+def _has_value_at_rest(text: str, start: Point) -> bool:
+    values = dict.fromkeys(PLATFORM_VARIABLES, 0.0) | dict(zip(AXES, start, strict=True))
+    try:
+        return isfinite(evaluate(REAL, parse_expression(text, PLATFORM_VARIABLES), values))
+    except (ArithmeticError, ValueError):
+        return False

@@ -20,7 +20,7 @@ from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rotation import multiply, quaternion_of
 
 from ..array_validation import validate_array, validate_quaternion
-from ..errors import ArgumentError, UnreachableError
+from ..errors import ArgumentError, InputError, UnreachableError
 from ..validation import validate_integer
 from .cable_routes import attachment_points, cable_routes
 from .schema import Point, Quaternion, Robot, validate_robot
@@ -182,13 +182,25 @@ def is_same_pose(one: ForwardSolution, other: ForwardSolution, scale: float) -> 
 def validated_pose(
     caller: str, robot: Robot, position: Sequence[float] | Array | None, orientation: Sequence[float] | Array | None
 ) -> tuple[Array, Quaternion]:
-    """A pose in m and as a unit quaternion, by default the start as declared; raises ArgumentError if it is invalid."""
+    """A pose in m and as a unit quaternion, by default the start as declared.
+
+    Raises ArgumentError if it is invalid, InputError where a point mass is to turn.
+    """
     platform = validate_robot(f"{caller}: robot", robot).platform
     at = platform.start if position is None else position
     array = validate_array(f"{caller}: position", at, (3,), "the position [x, y, z] in m")
     if orientation is None:
         return array, platform.start_orientation
-    return array, validate_quaternion(f"{caller}: orientation", orientation)
+    quaternion = validate_quaternion(f"{caller}: orientation", orientation)
+    if any(quaternion[1:]):
+        require_rigid_body(robot)
+    return array, quaternion
+
+
+def require_rigid_body(robot: Robot) -> None:
+    """Raise InputError for a point mass, which does not turn."""
+    if not robot.platform.is_rigid_body:
+        raise InputError(robot.name, "has a point mass, which does not turn", "give [platform] an inertia")
 
 
 def turned_orientation(orientation: Quaternion, rotation_vector: Array) -> Quaternion:

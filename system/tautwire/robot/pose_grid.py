@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .kinematics import turned_orientation, validated_pose
+from .kinematics import require_rigid_body, turned_orientation, validated_pose
 from .schema import Quaternion, Robot
 
 Array = NDArray[np.float64]
@@ -111,8 +111,7 @@ def orientation_grid(
     Raises InputError for a point mass, or an invalid range or spacing.
     """
     ranges = np.array(_validated_range(robot, rotation_range))
-    if not robot.platform.is_rigid_body:
-        raise InputError(robot.name, "has a point mass, which does not turn", "give [platform] an inertia")
+    require_rigid_body(robot)
     at, declared = validated_pose("orientation_grid", robot, position, orientation)
     return OrientationGrid(_axes(-ranges, ranges, np.zeros(3), spacing, "rad"), at, declared)
 
@@ -122,8 +121,8 @@ def _validated_range(robot: Robot, rotation_range: Sequence[float]) -> list[floa
     if ranges.shape != (3,) or not np.all((ranges >= 0.0) & (ranges <= np.pi)):
         shown = np.array2string(ranges, separator=", ")
         raise InputError("rotation range", f"{shown} is none", "give three rotations from 0 to pi rad")
-    if np.any(ranges > 0.0) and not robot.platform.is_rigid_body:
-        raise InputError(robot.name, "has a point mass, which does not turn", "give [platform] an inertia")
+    if np.any(ranges > 0.0):
+        require_rigid_body(robot)
     return [float(each) for each in ranges]
 
 

@@ -19,7 +19,7 @@ from .cable_routes import attachment_points
 from .kinematics import validated_pose
 from .robot_assembly import CableComponent, cable_components
 from .schema import Quaternion, Robot
-from .static_equilibrium import static_tensions
+from .static_equilibrium import tensions_at
 from .static_load import static_load
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def stiffness_matrix(
     array, quaternion = validated_pose("stiffness_matrix", robot, position, orientation)
     at: list[float] = array.tolist()
     if tensions is None:
-        carried = static_tensions(robot, array)
+        carried = tensions_at(robot, array, quaternion)
     else:
         expected = "one tension a cable in N"
         carried = validate_array("stiffness_matrix: tensions", tensions, (robot.cable_count,), expected)

@@ -200,7 +200,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         effects=read_effects(effect, len(cables), platform.is_rigid_body) if effect else (),
         winch=_read_winch(winch) if winch else None,
         fmus=_read_fmus(fmu, len(cables)) if fmu else (),
-        formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),
+        formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables)), platform.start),
         recorded_columns=read_recorded_columns(root, len(cables)),
         tracker=read_tracker_table(root),
         native_fmus=_read_native_fmus(fmu) if fmu else False,

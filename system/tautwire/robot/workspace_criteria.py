@@ -67,6 +67,8 @@ def wrench_closure_margin(robot: Robot, position: Array, orientation: Quaternion
     """
     del motion
     matrix = _scaled_structure_matrix(robot, position, orientation)
+    if np.linalg.matrix_rank(matrix, CLOSURE_TOLERANCE) < len(matrix):
+        return np.nan
     margin = polytope_margin(matrix, TensionLimits(0.0, 1.0, 0.0), np.zeros((1, len(matrix))))
     return margin if margin > CLOSURE_TOLERANCE else np.nan
 
@@ -117,6 +119,8 @@ def _required_wrenches(robot: Robot, position: Array, orientation: Quaternion, m
     force = float(total_mass(REAL, constants, platform_effects(robot))) * motion.acceleration
     forces = force * _corners(motion.acceleration)
     if not robot.platform.is_rigid_body:
+        # What a planar robot cannot do it need not.
+        forces[:, [axis for axis in range(3) if axis not in robot.axes_in_plane]] = 0.0
         return _point_load(robot, position, orientation) + forces
     body = body_constants(robot)
     arm = np.array(rotate(orientation, body.centre_of_mass))

@@ -21,9 +21,16 @@ def polytope_margin(structure_matrix: Array, limits: TensionLimits, required: Ar
 
     ``min h(n) - n . w`` over unit face normals n and required w, ``h(n) = sum_k max(T_min n . a_k, T_max n . a_k)``,
     with the columns a_k of ``structure_matrix`` A (d, k): two, three or six coordinates of one unit. Negative outside.
+    Where the columns span less, the polytope is flat: faces are within the span, and what points out of it is outside.
 
     Source: Bouchard, Gosselin and Moore (2010), Journal of Mechanisms and Robotics 2(1), 011013.
     """
+    left_vectors, singular_values, _ = np.linalg.svd(structure_matrix)
+    rank = int(np.sum(singular_values > PARALLEL_TOLERANCE * singular_values[0]))
+    beside = np.max(np.abs(required @ left_vectors[:, rank:]), initial=0.0)
+    if beside > PARALLEL_TOLERANCE * np.max(np.abs(required), initial=1.0):
+        return -float(beside)
+    structure_matrix, required = left_vectors[:, :rank].T @ structure_matrix, required @ left_vectors[:, :rank]
     normals = face_normals(structure_matrix)
     projections = normals @ structure_matrix
     # Infinity times zero is not zero: a cable in the plane of a face does not contribute.
@@ -39,17 +46,12 @@ def polytope_margin(structure_matrix: Array, limits: TensionLimits, required: Ar
 
 
 def face_normals(structure_matrix: Array) -> Array:
-    """Unit normals of all faces, in both directions; of wrenches that no cable exerts if the columns span less.
+    """Unit normals of all faces, in both directions; the columns span all.
 
     Each face contains d - 1 independent columns, whose generalised cross product is its normal.
     """
     rows, count = structure_matrix.shape
-    left_vectors, singular_values, _ = np.linalg.svd(structure_matrix)
-    rank = int(np.sum(singular_values > PARALLEL_TOLERANCE * singular_values[0]))
-    if rank < rows:
-        normals = left_vectors[:, rank:].T
-        return np.vstack([normals, -normals])
-    chosen = np.array(list(combinations(range(count), rows - 1)))
+    chosen = np.array(list(combinations(range(count), rows - 1)), dtype=int)
     columns = np.moveaxis(structure_matrix[:, chosen], 1, 0)
     crossed = _generalised_cross_products(columns)
     sizes = np.linalg.norm(crossed, axis=1)
