@@ -78,7 +78,7 @@ def test_it_is_the_plant_of_the_laws(name: str, tmp_path: Path) -> None:
 def test_rigid_platforms_are_the_plant_of_the_laws(tmp_path: Path) -> None:
     """At the step by default six stiff ropes, which vibrate at 42 Hz, do not converge."""
     exact = linearise(octahedral_robot()).system
-    found = linearise_robot_fmus(build_fmus(octahedral_robot(), tmp_path), step=0.004)
+    found = linearise_robot_fmus(build_fmus(octahedral_robot(), tmp_path, native=True), step=0.004)
     names = [[f"{name}_{axis}" for axis in "xyz"] for name in ("external_force", "external_moment", "angular_velocity")]
     assert found.system.input_labels[-6:] == [*names[0], *names[1]]
     assert set(names[2]) < set(found.system.output_labels)
@@ -94,13 +94,16 @@ def smooth(case: Case) -> bool:
     return case.name != "hysteresis" and not {"slip", "tension_delay", "position_delay"} & set(case.law)
 
 
+FIRST_FORMS = {case.name: case for case in reversed((*CASES, *UNLISTED_CASES)) if smooth(case)}.values()
+
+
 @pytest.mark.validate(but=["damping-damping"])
-@pytest.mark.parametrize("case", [case for case in (*CASES, *UNLISTED_CASES) if smooth(case)], ids=str)
+@pytest.mark.parametrize("case", FIRST_FORMS, ids=str)
 def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path) -> None:
     robot = with_effects(paper_robot(damping=4e8), case)
     exact = linearise(robot).system
     # FMUs also show branches of relaxation that are not in use.
-    plant = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path, native=True), states=exact.state_labels)
     assert plant.system.state_labels == exact.state_labels
     assert max(distances(plant, exact).values()) < AGREES
 
@@ -117,7 +120,7 @@ def test_effects_are_found_with_their_states(tmp_path: Path) -> None:
     for name, values in effects.items():
         robot = robot.with_effect(EffectSetting(name, values, robot.cable_numbers))
     exact = linearise(robot).system
-    plant = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path, native=True), states=exact.state_labels)
     assert plant.system.state_labels == exact.state_labels
     assert max(distances(plant, exact).values()) < AGREES
 
@@ -251,14 +254,14 @@ def test_an_unknown_state_is_refused(damped_fmus: RobotFmus) -> None:
 def test_dead_time_is_refused(tmp_path: Path) -> None:
     robot = paper_robot(damping=4e8).with_effect(EffectSetting("sensor_delay", {"position_delay": 0.05}, (1, 2, 3)))
     with pytest.raises(IdentificationError):
-        linearise_robot_fmus(build_fmus(robot, tmp_path))
+        linearise_robot_fmus(build_fmus(robot, tmp_path, native=True))
 
 
 @pytest.mark.validate
 def test_drift_is_noted(tmp_path: Path) -> None:
     setting = EffectSetting("thermal", {"rise": 10.0, "time": 20.0, "expansion": 1.2e-5}, (1, 2, 3))
     robot = paper_robot(damping=4e8).with_effect(setting)
-    plant = linearise_robot_fmus(build_fmus(robot, tmp_path))
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path, native=True))
     assert len(plant.notes) == 1 and plant.notes[0].startswith("not quite at rest: platform.velocity.z")
     assert max(distances(plant, linearise(robot).system).values()) < AGREES
 
@@ -271,7 +274,7 @@ def slipping(slip: float) -> Robot:
 
 @pytest.mark.validate
 def test_a_small_slope_change_at_rest_is_reported(tmp_path: Path) -> None:
-    notes = linearise_robot_fmus(build_fmus(slipping(2e-5), tmp_path)).notes
+    notes = linearise_robot_fmus(build_fmus(slipping(2e-5), tmp_path, native=True)).notes
     assert len(notes) == 1
     assert notes[0].startswith("nonsmooth at rest: responses to pulses of winch_speed_1 up and down differ by 3%")
 
@@ -280,4 +283,4 @@ def test_a_large_slope_change_at_rest_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         IdentificationError, match=r"nonsmooth at rest: .* cable_1\.winch_speed up and down differ by 32%"
     ):
-        linearise_robot_fmus(build_fmus(slipping(2e-4), tmp_path))
+        linearise_robot_fmus(build_fmus(slipping(2e-4), tmp_path, native=True))

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.linear import OperatingPointError, linearise, model_document
+from tautwire.linear.modes import cable_energies
+from tautwire.linear.operating_point import Pose
+from tautwire.robot.pose_stiffness import stiffness_matrix
 from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter, State
 from tautwire_fmu.laws.effects.damping import Values
@@ -248,3 +251,12 @@ def test_effect_that_never_settles_is_refused(monkeypatch: pytest.MonkeyPatch) -
     robot = with_branch(monkeypatch, lambda m, v, s, cable, motion: (1.0 + 0.0 * motion.strain,))
     with pytest.raises(OperatingPointError, match="never converge"):
         linearise(robot)
+
+
+def test_the_energies_of_cables_with_moved_exit_points_are_those_of_the_stiffness() -> None:
+    robot = paper_robot().with_effect(EffectSetting("anchor", {"x": 20.0, "y": 10.0, "z": -30.0}, (1,)))
+    plant = linearise(robot)
+    pose, shapes = Pose(robot, plant.position, plant.orientation), plant.modes.shapes
+    energies = cable_energies(pose, plant.tensions, plant.tension_slopes, shapes)
+    stiffness = stiffness_matrix(robot, plant.tensions, plant.position)
+    assert energies.sum(axis=0) == pytest.approx(np.diag(shapes.T @ stiffness @ shapes), rel=1e-9)

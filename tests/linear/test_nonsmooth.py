@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tautwire.linear import OperatingPointError, linearise
-from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors
+from tautwire.robot.schema import Cable, EffectSetting, Formula, Platform, Robot, Sensors
 from tests.support.robots import example, paper_robot, with_damping
 
 # Straight below the line between two exit points the third cable has nothing to carry.
@@ -101,3 +101,8 @@ def test_a_platform_that_cables_hold_in_no_direction_but_one_is_refused() -> Non
     with pytest.raises(OperatingPointError) as caught:
         linearise(light)
     assert caught.value.position == (0.0, 0.0, 0.0)
+
+
+def test_a_formula_that_is_steep_at_rest_is_noted() -> None:
+    notes = linearise(replace(paper_robot(), formulas=(Formula("force_z", "-50*tanh(vz/0.001)"),))).notes
+    assert any("formula" in note and "nonsmooth" in note for note in notes)

@@ -25,7 +25,7 @@ def robot(request: pytest.FixtureRequest) -> Robot:
 
 @pytest.fixture(scope="module")
 def fmus(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
-    return build_fmus(robot, tmp_path_factory.mktemp(robot.name))
+    return build_fmus(robot, tmp_path_factory.mktemp(robot.name), native=True)
 
 
 @pytest.mark.validate(but=["three"])

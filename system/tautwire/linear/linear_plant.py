@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from ..errors import InputError
+from ..robot.kinematics import validated_pose
 from ..robot.rigid_equilibrium import static_equilibrium
 from ..robot.schema import Quaternion, Robot, validate_robot
 from ..robot.static_equilibrium import static_tensions
@@ -79,7 +80,8 @@ def linearise(
     behaviour within a swing of ``swing`` (m) in a mode, see :func:`tautwire.linear.nonsmooth.validity_notes`.
 
     Raises UnreachableError where the cables cannot hold the platform, OperatingPointError where they do not hold
-    it stably, or where the states of an effect never settle, ArgumentError for an invalid argument.
+    it stably, or where the states of an effect never settle, InputError where a point mass is to turn, ArgumentError
+    for an invalid argument.
     """
     validate_robot("linearise: robot", robot)
     validate_number("linearise: swing", swing, SWING_RULE)
@@ -107,7 +109,7 @@ def _pose_at_rest(
 ) -> tuple[Pose, Array, float]:
     """The pose at rest at a position (m), static tensions (n,) in N there, and what passes for rest."""
     if not robot.platform.is_rigid_body:
-        pose = Pose(robot, position, robot.platform.start_orientation)
+        pose = Pose(robot, *validated_pose("linearise", robot, position, orientation))
         return pose, static_tensions(robot, position), ACCELERATION_TOLERANCE
     at_rest = static_equilibrium(robot, position, orientation=orientation)
     # Two cables hold a surveyed position only nearly; statics has judged that.

@@ -56,7 +56,7 @@ def validity_notes(
         f"cable {cable + 1} becomes slack at an amplitude of {slack_swings[cable]:.2g} m"
         for cable in np.setdiff1d(np.flatnonzero(slack_swings <= swing), slack)
     ]
-    if operating_point.robot.effects and swing > 0.0:
+    if (operating_point.robot.effects or operating_point.robot.formulas) and swing > 0.0:
         amplitude = min(swing, 0.5 * float(np.min(slack_swings)))
         notes += _swing_notes(operating_point, matrices, modes, amplitude)
         notes += _winch_notes(operating_point, matrices, 2.0 * np.pi * float(modes.frequencies[0]) * amplitude)
@@ -70,7 +70,7 @@ def _slack_swings(tensions: Array, tension_slopes: Array) -> Array:
 
 
 def _effect_description(robot: Robot) -> str:
-    names = dict.fromkeys(setting.name for setting in robot.effects)
+    names = dict.fromkeys([*(setting.name for setting in robot.effects), *(["formula"] if robot.formulas else [])])
     return f"an effect ({', '.join(names)}) is nonsmooth or strongly nonlinear near rest"
 
 

@@ -75,8 +75,7 @@ class Pose:
     @property
     def chords(self) -> Array:
         """Distances of the exit points from the attachments (n,), in m."""
-        distances: Array = np.linalg.norm(np.array(self.robot.anchors) - self.attachments, axis=1)
-        return distances
+        return np.array([route.chord for route in self.routes])
 
     def displacements(self, shapes: Array) -> Array:
         """Displacements (1 + n, 3, k) of centre of mass and attachments along ``shapes`` (d, k), to first order.
