@@ -284,3 +284,13 @@ def test_any_dialect_is_read_back_equal(
             read(tmp_path, written if not dialect.quoted else written.replace(b'"', b""))
         return
     assert read(tmp_path, written).frame()[list(table.columns)].equals(table)
+
+
+@pytest.mark.parametrize("text", ["gain 3,5 V", "3,5", "1,234"])
+def test_commas_of_a_column_that_is_not_read_are_no_decimal_marks(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"0.0{row};0.1;1.5;{text}" for row in range(3)]
+    path.write_text("\n".join(["time;winch_speed_1;x;remark", *rows]), encoding="utf-8")
+    recording = read_recording(path, 1)
+    assert recording.position[:, 0].tolist() == [1.5, 1.5, 1.5]
+    assert recording.unknown_columns == ("remark",)

@@ -90,3 +90,22 @@ def test_a_name_that_repeats_is_answered_with_those_that_are_made_of_it(tmp_path
     (tmp_path / "tracker.csv").write_text(VICON + ROW, encoding="utf-8")
     with pytest.raises(RecordingError, match=r"line 4: has no column 'X'.*Body:RB1_X"):
         read_tracker(tmp_path / "tracker.csv", declared("Frame", "X", "mm"))
+
+
+@pytest.mark.parametrize(
+    ("lines", "names"),
+    [
+        (["Time [s];Speed1;Speed2;State", "0,00;0,1;0,1;RUN", "0,01;0,1;0,1;RUN"], "Time [s] Speed1 Speed2 State"),
+        (["Date;Time;Speed1", "31.05.2024;12:00:00,00;0,1", "31.05.2024;12:00:00,01;0,1"], "Date Time Speed1"),
+        (["time,speed,on", "0,1,TRUE", "1,2,FALSE"], "time speed on"),
+    ],
+)
+def test_samples_beside_a_text_are_samples(lines: list[str], names: str) -> None:
+    samples = first_samples(lines)
+    assert [sample.index for sample in samples] == [1]
+    named = names_above(lines, samples[0])
+    assert named is not None and " ".join(named.names) == names
+
+
+def test_texts_beside_numbers_that_do_not_repeat_are_no_samples() -> None:
+    assert first_samples(["version,1,2,beta", "name,hall,3", "mass,12,kg,4"]) == []

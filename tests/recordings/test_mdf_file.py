@@ -114,3 +114,25 @@ def test_the_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     path = written(tmp_path / "fit.mf4", (TIME, SPEEDS | OUTPUTS))
     monkeypatch.setitem(sys.modules, "asammdf", None)
     assert "needs the package asammdf, which is not installed; run pip install asammdf" in refused(path)
+
+
+def test_a_gap_of_winch_speeds_beside_another_group_is_not_interpolated(tmp_path: Path) -> None:
+    time = np.arange(0.0, 10.0, 0.01)
+    kept = time[(time <= 3.0) | (time >= 8.0)]
+    speeds = {name: np.sin(kept) for name in SPEEDS}
+    said = refused(written(tmp_path / "fit.mf4", (kept, speeds), (time, {"x": time})))
+    assert "row 302, column winch_speed_1: is 'nan'" in said and "at most 5 in a row are interpolated" in said
+
+
+def test_times_that_do_not_rise_are_refused(tmp_path: Path) -> None:
+    again = np.concatenate([TIME, TIME])
+    path = written(tmp_path / "fit.mf4", (again, {name: [*values, *values] for name, values in SPEEDS.items()}))
+    assert f"its time {TIME[0]:g} s at sample 4 does not come after {TIME[2]:g} s" in refused(path)
+
+
+def test_a_channel_without_times_is_refused(tmp_path: Path) -> None:
+    with asammdf.MDF(written(tmp_path / "fit.mf4", (TIME, SPEEDS | OUTPUTS))) as content:
+        master = content.groups[0].channels[content.masters_db[0]]
+        master.channel_type, master.sync_type = 0, 0
+        content.save(tmp_path / "counted.mf4")
+    assert "channel winch_speed_1: has no times" in refused(tmp_path / "counted.mf4")

@@ -105,7 +105,7 @@ def shipped(name: str) -> tuple[Robot, Recording]:
 
 
 @pytest.mark.validate(but=["three"])
-@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+@pytest.mark.parametrize("name", ["three", "eight"])
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_told_with_its_cause_and_its_remedy(name: str, mistake: str) -> None:
     robot, recording = shipped(name)
@@ -198,6 +198,7 @@ def test_a_correct_recording_is_not_refused(name: str) -> None:
     assert check is not None and check.misfit < 0.01
 
 
+@pytest.mark.validate(but=["1.08"])
 @pytest.mark.parametrize(
     "effects",
     [
@@ -486,11 +487,10 @@ def test_lengths_and_speeds_in_mm_have_each_their_own_unit() -> None:
 WITHOUT_LINES = ("clocks apart", "a frame that is turned", "centre of mass")
 
 
-@pytest.mark.validate(but=["three-z downwards"])
+@pytest.mark.validate(but=["z downwards"])
 @pytest.mark.parametrize("mistake", [mistake for mistake in MISTAKES if mistake not in WITHOUT_LINES])
-@pytest.mark.parametrize("name", ["three", "eight"])
-def test_the_told_lines_mend_the_recording(tmp_path: Path, name: str, mistake: str) -> None:
-    robot, recording = shipped(name)
+def test_the_told_lines_mend_the_recording(tmp_path: Path, mistake: str) -> None:
+    robot, recording = shipped("three")
     assert_mended_by_told_lines(robot, MISTAKES[mistake][0](recording), tmp_path)
 
 

@@ -235,6 +235,11 @@ def test_a_file_is_known_by_its_first_bytes(tmp_path: Path) -> None:
     assert "is MCAP by its first bytes, and not by its name; rename it to end in .mcap" in refused(path)
 
 
+def test_a_suffix_in_capitals_is_to_be_written_small(tmp_path: Path) -> None:
+    path = (bag(tmp_path, is_sqlite=True) / "run.db3").rename(tmp_path / "log.DB3")
+    assert "ends in '.DB3', which rosbags does not know; rename it to end in .db3" in refused(path)
+
+
 def test_a_bag_of_ros_1_is_refused_with_the_command_that_converts_it(tmp_path: Path) -> None:
     path = tmp_path / "run.bag"
     path.write_bytes(b"#ROSBAG V2.0\nE\0\0\0")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -105,3 +106,19 @@ def test_checking_tells_of_errors_exactly_where_reading_refuses(tmp_path: Path, 
             read_recording(path, 2)
     else:
         assert np.isfinite(read_recording(path, 2).winch_speed).all()
+
+
+def test_a_gap_of_few_samples_that_lasts_long_is_refused_with_its_times(tmp_path: Path) -> None:
+    frame = table({"winch_speed_1": [10]})
+    frame.loc[10:, "time"] += 0.5
+    times = frame["time"].to_numpy()
+    with pytest.raises(RecordingError) as caught:
+        read_recording(written(tmp_path, frame), 2)
+    said = f"column winch_speed_1: has no number between {times[9]:.6g} s and {times[11]:.6g} s; only gaps of up to "
+    assert said in str(caught.value)
+
+
+def test_a_recording_of_one_sample_without_a_speed_is_refused_in_one_line(tmp_path: Path) -> None:
+    with warnings.catch_warnings(), pytest.raises(RecordingError, match="line 2, column winch_speed_1: is empty"):
+        warnings.simplefilter("error")
+        read_recording(written(tmp_path, table({"winch_speed_1": [0]}).head(1)), 2)

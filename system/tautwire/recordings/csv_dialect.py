@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from io import StringIO
 from itertools import islice
@@ -112,7 +113,8 @@ def _rewritten(text: CsvText, source: _Source) -> CsvText:
     head = source.content[: source.start]
     if not (header.is_standard and separator == header.separator and names == header.names):
         head = b"\n" * header.index + _header_row(names, separator) + b"\n" * (header.data_index - header.index)
-    decimal_mark = _decimal_mark(body, separator, header.data_index, source.file)
+    is_read = [name in header.known for name in names]
+    decimal_mark = _decimal_mark(body, separator, is_read, header.data_index, source.file)
     return replace(
         text,
         content=head + body,
@@ -172,16 +174,19 @@ def _header_row(names: tuple[str, ...], separator: str) -> bytes:
     return row.getvalue().encode()
 
 
-def _decimal_mark(body: bytes, separator: str, first_index: int, file: str) -> str:
-    """The decimal mark; raises RecordingError where commas may be decimal or separate thousands."""
+def _decimal_mark(body: bytes, separator: str, is_read: Sequence[bool], first_index: int, file: str) -> str:
+    """The decimal mark of the columns that are read; RecordingError where commas may also separate thousands."""
     if separator == "," or b"," not in body:
         return "."
-    edge = separator.encode()
+    edge, line_end = separator.encode(), b"\n" if b"\n" in body else b"\r"
     number = re.compile(
         rb'(?<![^\r\n" ' + edge + rb"])([-+]?[0-9]*,[0-9]+(?:[eE][-+]?[0-9]+)?)(?![^\r\n\" " + edge + rb"])"
     )
     first = None
     for match in number.finditer(body):
+        column = body.count(edge, body.rfind(line_end, 0, match.start()) + 1, match.start())
+        if column < len(is_read) and not is_read[column]:
+            continue
         if not _THOUSANDS.fullmatch(match.group(1)):
             return ","
         first = first or match

@@ -32,16 +32,25 @@ class NamesLine:
 
 
 def first_samples(lines: Sequence[str]) -> list[FirstSample]:
-    """Lines that may be the first of samples, numbers of two or more columns, by each separator that makes them so."""
-    found = []
-    for index, line in enumerate(lines):
-        if is_comment(line) or not line.strip():
-            continue
+    """Lines that may be the first of samples, numbers of two or more columns, by each separator that makes them so.
+
+    Where every line has a text, as in a column of states, those whose numbers are in the same columns as in the next.
+    """
+    rows = [(index, line) for index, line in enumerate(lines) if line.strip() and not is_comment(line)]
+    found, beside_text = [], []
+    for number, (index, line) in enumerate(rows):
         for separator in SEPARATORS:
             cells = split_cells(line, separator)
-            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
+            if len(cells) < 2 or not cells[0]:
+                continue
+            are_samples = [_is_sample(cell) for cell in cells]
+            if all(are_samples):
                 found.append(FirstSample(index, separator, len(cells)))
-    return found
+            elif sum(are_samples) > 1 and number + 1 < len(rows):
+                next_cells = split_cells(rows[number + 1][1], separator)
+                if [_is_sample(cell) for cell in next_cells] == are_samples:
+                    beside_text.append(FirstSample(index, separator, len(cells)))
+    return found or beside_text
 
 
 def _is_sample(cell: str) -> bool:

@@ -16,6 +16,7 @@ from ..input_files import readable_file
 from .column_map import ColumnMap
 from .recording_table import ColumnTable, ErrorSink, Header, parse_header, require_samples
 from .units import Unit, units_in_words
+from .winch_gaps import interpolated_at
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "
@@ -42,11 +43,11 @@ def is_mdf(path: str | Path) -> bool:
 def open_mdf(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error) -> ColumnTable:
     """Open the MDF file of a recording, as a table with a row at each sample time of any channel that is read.
 
-    Winch speeds are interpolated linearly; an output has no value at the sample times of others. Times that some winch
-    speed does not cover are omitted. Needs the package asammdf.
+    Winch speeds are interpolated linearly over up to five missing samples; an output has no value at the sample times
+    of others. Times that some winch speed does not cover are omitted. Needs the package asammdf.
 
-    Raises RecordingError where it is no MDF file, a channel is missing, duplicate or not numeric, or a unit is not
-    known.
+    Raises RecordingError where it is no MDF file, a channel is missing, duplicate, not numeric or without rising times,
+    or a unit is not known.
     Errors in the names of channels go to the ``sink``.
     """
     file = str(path)
@@ -105,6 +106,8 @@ def _read_channels(content: Any, file: str, columns: ColumnMap, sink: ErrorSink)
         if len(locations[stored[name]]) > 1:
             raise RecordingError(where, "appears more than once", "keep one of them")
         group, index = locations[stored[name]][0]
+        if group not in content.masters_db:
+            raise RecordingError(where, "has no times", "record it in a group with a master channel of time")
         signals[name] = content.get(stored[name], group=group, index=index)
         text = signals[name].unit
         unit = columns.stated_unit(name, text, where) if text.strip() else None
@@ -121,10 +124,15 @@ def _read_channels(content: Any, file: str, columns: ColumnMap, sink: ErrorSink)
 def _channel(signal: Any, name: str, scaled: Header, where: str) -> Channel:
     if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "iuf":
         raise RecordingError(where, "contains no numbers", "store one number per sample, in SI units")
+    time = np.asarray(signal.timestamps, dtype=np.float64)
+    if (np.diff(time) <= 0.0).any():
+        sample = int(np.argmax(np.diff(time) <= 0.0)) + 1
+        problem = f"its time {time[sample]:.9g} s at sample {sample + 1} does not come after {time[sample - 1]:.9g} s"
+        raise RecordingError(where, problem, "times must rise: cut the recording there")
     values = scaled.to_si(name, signal.samples.astype(np.float64))
     if signal.invalidation_bits is not None:
         values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
-    return Channel(np.asarray(signal.timestamps, dtype=np.float64), values)
+    return Channel(time, values)
 
 
 def _align_on_common_time(channels: Mapping[str, Channel], file: str) -> dict[str, NDArray[np.float64]]:
@@ -138,7 +146,7 @@ def _align_on_common_time(channels: Mapping[str, Channel], file: str) -> dict[st
     columns = {"time": time}
     for name, channel in channels.items():
         if name.startswith(_INPUTS):
-            columns[name] = np.interp(time, channel.time, channel.values)
+            columns[name] = interpolated_at(time, channel.time, channel.values, _TIME_TOLERANCE)
             continue
         columns[name] = np.full(len(time), np.nan)
         indices = np.clip(np.searchsorted(time, channel.time - _TIME_TOLERANCE), 0, max(len(time) - 1, 0))

@@ -32,7 +32,7 @@ from .placeholder_values import without_placeholders
 from .quaternion_columns import are_valid, unit_quaternions
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 from .ros_bag import is_bag, open_bag
-from .winch_gaps import bridge_winch_gaps
+from .winch_gaps import bridge_winch_gaps, long_gap_error
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 
@@ -234,7 +234,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         has_time_column=table.header.has_time_column and table.header.clock is None,
     )
     if not _is_valid(recording):
-        raise _first_error(table)
+        raise _first_error(table, long_gap_error(numbers, table.file))
     return replace(recording, orientation=unit_quaternions(recording.orientation))
 
 
@@ -278,8 +278,10 @@ def _open_table(
         return table, ("has none of the columns that are declared, and is read by the standard names",)
 
 
-def _first_error(table: CsvTable | ColumnTable) -> RecordingError:
-    return next(row_errors(table.rows(), table.header, table.file), not_a_table_error(table.file))
+def _first_error(table: CsvTable | ColumnTable, otherwise: RecordingError | None = None) -> RecordingError:
+    """The first error that a rule on rows finds; ``otherwise`` one that concerns time between them."""
+    error = next(row_errors(table.rows(), table.header, table.file), otherwise)
+    return error or not_a_table_error(table.file)
 
 
 def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "frame") -> Recording:

@@ -161,8 +161,10 @@ def _require_plain_files(path: Path) -> None:
                 hint = "make one of ROS 2 of it: rosbags-convert --src FILE.bag --dst FOLDER --dst-typestore latest"
                 raise RecordingError(str(path), "is a bag of ROS 1", hint)
         if path.suffix not in BAG_SUFFIXES:
-            hint = f"rename it to end in {BAG_SUFFIXES[0]}"
-            raise RecordingError(str(path), "is MCAP by its first bytes, and not by its name", hint)
+            suffix, problem = BAG_SUFFIXES[0], "is MCAP by its first bytes, and not by its name"
+            if path.suffix.lower() in BAG_SUFFIXES:
+                suffix, problem = path.suffix.lower(), f"ends in {path.suffix!r}, which rosbags does not know"
+            raise RecordingError(str(path), problem, f"rename it to end in {suffix}")
         return
     if not (path / METADATA_FILE).exists():
         hint = "run ros2 bag reindex on it, or name a data file inside it"

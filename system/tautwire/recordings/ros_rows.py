@@ -12,7 +12,7 @@ from ..errors import RecordingError, format_value
 from ..name_suggestions import join_names
 from ..robot.schema import QUATERNION_COLUMNS
 from .quaternion_columns import with_continuous_signs
-from .winch_gaps import MAX_GAP_SAMPLES
+from .winch_gaps import interpolated_at
 
 _INPUTS = ("winch_speed_", "rope_length_")
 _NANOSECONDS = 1e9  # in a second
@@ -66,7 +66,7 @@ def align_on_winch_rows(numbers: Mapping[str, SampledNumber], file: str) -> Rows
     columns = {"time": (rows - rows[0]) / _NANOSECONDS}
     for name, each in series.items():
         if name.startswith(_INPUTS):
-            columns[name] = _interpolated(each, rows, period)
+            columns[name] = interpolated_at(rows, each.times, each.values, row_period=period)
             continue
         columns[name] = _nearest_samples(each, rows, 0.5 * period)
         if np.isfinite(each.values).any() and not np.isfinite(columns[name]).any():
@@ -96,17 +96,6 @@ def _in_words(columns: Mapping[str, NDArray[np.float64]], repeated: int) -> str:
     parts = [f"; {join_names(names)} in {count} of {row_count} rows" for count, names in sparse.items()]
     parts += [f"; without {repeated} numbers at a time that another has"] if repeated else []
     return "".join(parts)
-
-
-def _interpolated(number: SampledNumber, rows: NDArray[np.int64], period: float) -> NDArray[np.float64]:
-    """Values (N,) at all rows, linear between samples; NaN inside of gaps that are too long for that."""
-    column = np.interp(rows - rows[0], number.times - rows[0], number.values)
-    steps = np.diff(number.times)
-    if len(steps):
-        longest = (MAX_GAP_SAMPLES + 1) * max(float(np.median(steps)), period)
-        after = np.clip(np.searchsorted(number.times, rows), 1, len(steps))
-        column[(steps[after - 1] > longest) & ~np.isin(rows, number.times)] = np.nan
-    return column
 
 
 def _nearest_samples(number: SampledNumber, rows: NDArray[np.int64], half_period: float) -> NDArray[np.float64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,42 @@ def bridge_winch_gaps(
     return bridged, tuple(notes)
 
 
+def interpolated_at(
+    rows: NDArray[Any],
+    times: NDArray[Any],
+    values: NDArray[np.float64],
+    tolerance: float = 0.0,
+    row_period: float = 0.0,
+) -> NDArray[np.float64]:
+    """Values (N,) at the times of ``rows`` (N,), linear between samples (M,) at ``times``; NaN inside of long gaps.
+
+    A gap is long where more than ``MAX_GAP_SAMPLES`` of the series, or of rows ``row_period`` apart, would fit into it.
+    Rows within the ``tolerance`` of a sample are in none. All times have one unit, in which ``times`` rise.
+    """
+    column = np.interp(rows - rows[:1], times - rows[:1], values)
+    steps = np.diff(times)
+    if len(steps):
+        longest = (MAX_GAP_SAMPLES + 1) * max(float(np.median(steps)), row_period)
+        after = np.clip(np.searchsorted(times, rows), 1, len(steps))
+        is_sample = np.minimum(np.abs(times[after] - rows), np.abs(rows - times[after - 1])) <= tolerance
+        column[(steps[after - 1] > longest) & ~is_sample] = np.nan
+    return np.asarray(column, dtype=np.float64)
+
+
+def long_gap_error(columns: Mapping[str, NDArray[np.float64]], file: str) -> RecordingError | None:
+    """The error of a gap of few samples that lasts too long to be bridged; None where no gap is left."""
+    time = columns["time"]
+    for name, values in columns.items() if len(time) > 2 else ():
+        rows = np.flatnonzero(np.isnan(values))
+        if not len(rows) or not is_winch_column_used(name, columns):
+            continue
+        first, last = time[max(rows[0] - 1, 0)], time[min(rows[0] + 1, len(time) - 1)]
+        problem = f"has no number between {first:.6g} s and {last:.6g} s"
+        hint = f"only gaps of up to {_longest_gap(time):.3g} s are interpolated: cut the recording there"
+        return RecordingError(f"{file}: column {name}", problem, hint)
+    return None
+
+
 def is_winch_column_used(name: str, names: Container[str]) -> bool:
     """Whether a column is a rope length or a winch speed that is read: a speed beside the length of its rope is not."""
     return name.startswith(_LENGTH) or (name.startswith(_SPEED) and name.replace(_SPEED, _LENGTH) not in names)
@@ -47,7 +83,7 @@ def _in_short_gaps(is_missing: NDArray[np.bool_], time: NDArray[np.float64]) -> 
     """Samples in gaps that are short, by their number and by time, and between numbers."""
     if len(time) < 3:
         return np.zeros(len(time), dtype=np.bool_)
-    longest = MAX_GAP_STRETCH * (MAX_GAP_SAMPLES + 1) * float(np.median(np.diff(time)))
+    longest = _longest_gap(time)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], is_missing, [False])).astype(np.int8)))
     is_short = np.zeros(len(is_missing), dtype=np.bool_)
     for start, stop in edges.reshape(-1, 2):
@@ -55,6 +91,11 @@ def _in_short_gaps(is_missing: NDArray[np.bool_], time: NDArray[np.float64]) -> 
         if stop - start <= MAX_GAP_SAMPLES and is_between and time[stop] - time[start - 1] <= longest:
             is_short[start:stop] = True
     return is_short
+
+
+def _longest_gap(time: NDArray[np.float64]) -> float:
+    """Time that a gap may last to be bridged, s."""
+    return MAX_GAP_STRETCH * (MAX_GAP_SAMPLES + 1) * float(np.median(np.diff(time)))
 
 
 class CellError(NamedTuple):
