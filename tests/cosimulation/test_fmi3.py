@@ -69,6 +69,7 @@ def test_both_versions_run_side_by_side_and_isolated(winch: Path, tmp_path: Path
     assert len([line for line in here.statistics.fallback_notes() if line.endswith("FMU winch_1, winch_2")]) == 2
 
 
+@pytest.mark.validate(but=["ERROR", "EARLY"])
 @needs_compiler
 @pytest.mark.parametrize(
     ("fault", "outcome", "logged"),

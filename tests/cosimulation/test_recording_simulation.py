@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 import pyarrow.parquet as pq
 import pytest
 
@@ -69,3 +70,14 @@ def test_memory_stays_flat_over_a_long_run(tmp_path: Path, monkeypatch: pytest.M
         )
     assert pq.read_metadata(tmp_path / "result.parquet").num_rows == 8_001
     assert seen[100] < seen[20] + 1.0
+
+
+def test_how_the_recording_was_read_is_told(tmp_path: Path) -> None:
+    write_recording(tmp_path / "recording.parquet", 50)
+    frame = pd.read_parquet(tmp_path / "recording.parquet")
+    frame["current"] = 1.0
+    frame.loc[5, "winch_speed_1"] = np.nan
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    gap, unread = read_recorded_inputs(example("three"), tmp_path / "log.csv").notes
+    assert "winch_speed_1 is interpolated in 1 sample" in gap
+    assert unread.endswith("not read: current")

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.fmus.component import Component
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import EffectSetting, Platform, Robot
@@ -167,3 +169,22 @@ def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> No
     assert np.max(np.abs(energy - energy[0])) < 1e-6 * vibration
     assert motion.statistics.energy_residual_share < 1e-9
     assert motion.statistics.warnings() == ()
+
+
+@pytest.mark.parametrize("patience", [None, 60.0])
+def test_a_run_that_begins_later_is_initialised_then(
+    three_fmus: RobotFmus, patience: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    time, speed = gentle_speeds(example("three"), 0.1, 0.02)
+    starts = set()
+    initialize = Component.initialize
+
+    def note(component: Component, start: float, *arguments: Any) -> None:
+        starts.add(start)
+        initialize(component, start, *arguments)
+
+    early = cosimulate(three_fmus, time, speed, patience=patience)
+    monkeypatch.setattr(Component, "initialize", note)
+    late = cosimulate(three_fmus, time + 5.0, speed, patience=patience)
+    assert late.position == pytest.approx(early.position, abs=1e-11)
+    assert starts == ({5.0} if patience is None else set())

@@ -41,7 +41,7 @@ def test_the_co_simulation_makes_the_same_motion(shipment: Shipment, tmp_path: P
             list("xyz"),
         )
     )
-    motion = cosimulate(build_fmus(completed(brief), tmp_path), time, speeds, step=0.1 / shipment.rate)
+    motion = cosimulate(build_fmus(completed(brief), tmp_path, native=True), time, speeds, step=0.1 / shipment.rate)
     assert np.max(np.abs(motion.position - positions)) < 1e-8
     assert np.max(np.abs(motion.tension - tensions)) < 1e-7 * np.max(tensions)
     if "qw" in true:
@@ -52,8 +52,9 @@ def test_the_co_simulation_makes_the_same_motion(shipment: Shipment, tmp_path: P
 
 
 @pytest.mark.validate
-@pytest.mark.parametrize("shipment", SHIPMENTS, ids=lambda shipment: shipment.name)
-def test_the_shipped_files_are_what_it_makes(shipment: Shipment) -> None:
+def test_the_shipped_files_are_what_it_makes() -> None:
+    """Those of the README; the others are made in the same way."""
+    (shipment,) = (each for each in SHIPMENTS if each.name == "three")
     shipped, made = pd.read_csv(EXAMPLES / shipment.name / "fit.csv"), make(shipment, "fit")
     assert list(shipped) == list(made)
     assert np.max(np.abs(shipped - made) / made.abs().max()) < 2e-6

@@ -17,7 +17,7 @@ from tautwire.cosimulation.robot_wiring import recorded_ports, robot_connections
 from tautwire.cosimulation.ssp_archive import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robot.schema import EffectSetting
+from tautwire.robot.schema import EffectSetting, UserFmu
 from tautwire_fmu.units import UNITS
 from tests.support.robots import LIMITED, paper_robot, with_winch
 
@@ -111,6 +111,16 @@ def test_every_parameter_has_its_exact_value(tmp_path: Path) -> None:
         expected = {v.name: (float(v.start), v.unit) for v in variables if v.causality == "parameter"}
         assert {p.name: (float(p.value), p.unit) for p in values.parameters} == expected
         assert ("effect.modulus.modulus" in expected) == (component.name == "cable_2")
+
+
+def test_a_users_fmu_gets_the_start_of_the_robot_file(three_fmus: RobotFmus, tmp_path: Path) -> None:
+    robot = paper_robot()
+    moved = replace(robot, platform=replace(robot.platform, start=(28.5, 0.25, 5.5)))
+    own = replace(moved, fmus=(UserFmu("platform", three_fmus.platform),))
+    description = read_ssd(str(write_ssp(own, build_fmus(own, tmp_path), tmp_path / "robot.ssp")))
+    (values,) = description.system.elements[0].parameterBindings[0].parameterValues
+    starts = {p.name: float(p.value) for p in values.parameters}
+    assert [starts[f"start.{axis}"] for axis in "xyz"] == [28.5, 0.25, 5.5]
 
 
 @pytest.mark.parametrize("name", STRUCTURES)

@@ -36,7 +36,7 @@ def exact() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
-    return build_fmus(ROBOT, tmp_path_factory.mktemp("slack"))
+    return build_fmus(ROBOT, tmp_path_factory.mktemp("slack"), native=True)
 
 
 def run(fmus: RobotFmus, step: float, locate_events: bool = True) -> tuple[np.ndarray, RunStatistics]:

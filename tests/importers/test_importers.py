@@ -28,8 +28,8 @@ def exact() -> np.ndarray:
 
 
 @pytest.mark.validate
-@pytest.mark.parametrize("step", [0.01, 0.001])
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: Path(importer.client).stem)
+@pytest.mark.parametrize(("folder", "step"), [("python", 0.01), ("native", 0.001)], indirect=["folder"])
 def test_an_importer_ends_where_the_robot_ends(
     importer: Importer, step: float, folder: Path, exact: np.ndarray
 ) -> None:

@@ -102,7 +102,7 @@ def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -
     inputs = PiecewiseLinearInput(recording.time[:count], recording.winch_speed[:count])
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
-    notes = (*notes, *notes_on_unstated_units(robot))
+    notes = (*recording.notes, *notes, *notes_on_unstated_units(robot))
     started = with_true_start(with_measured_start(robot, start.position))
     return RecordedInputs(started, inputs, (*notes, *orientation_notes(started)))
 

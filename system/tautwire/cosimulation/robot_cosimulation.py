@@ -132,10 +132,12 @@ def instantiate_robot(
     fmus: RobotFmus,
     journal: CallJournal | None = None,
     additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+    start: float = 0.0,
 ) -> Iterator[CouplingGraph]:
     """The coupling graph of a robot in initialization mode; instances and folders are removed when the block ends.
 
-    With a ``journal`` each FMU call is noted in it; ``additional`` components are coupled to the robot's.
+    With a ``journal`` each FMU call is noted in it; ``additional`` components are coupled to the robot's; ``start``
+    is the time in s at which the run begins.
     """
     wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
     new_component = Component if journal is None else partial(JournalledComponent, journal)
@@ -145,9 +147,9 @@ def instantiate_robot(
             for name, path in {**fmus.by_component, **additional.fmu_paths}.items()
         }
         for name, component in components.items():
-            start = {**fmus.user_start_values.get(name, {}), **fmus.start_settings.get(name, {})}
-            parameters = {key: value for key, value in start.items() if _is_parameter(component, key)}
-            component.initialize(0.0, parameters, fmus.relative_tolerance)
+            values = fmus.start_values_of(name)
+            parameters = {key: value for key, value in values.items() if _is_parameter(component, key)}
+            component.initialize(start, parameters, fmus.relative_tolerance)
         _require_platform_start(fmus, components[PLATFORM])
         yield build_coupling_graph(components, wiring)
 
@@ -169,7 +171,9 @@ def _require_platform_start(fmus: RobotFmus, platform: Component) -> None:
         block = platform.block(names)
         platform.read(block)
         expected = np.array([expected_values[f"{parameter}.{part}"] for part in parts])
-        if not np.max(np.abs(block.values - expected)) < START_TOLERANCE:
+        # Both signs of a quaternion are one orientation.
+        starts = (expected, -expected) if quantity == "orientation" else (expected,)
+        if not any(np.max(np.abs(block.values - start)) < START_TOLERANCE for start in starts):
             found_text, expected_text = (
                 ", ".join(f"{each:.9g}" for each in values) for values in (block.values, expected)
             )
@@ -266,10 +270,10 @@ def record_cosimulation(
     _require_step_support(fmus, experiment)
     wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
     experiment = replace(experiment, input_source=SelectedInputs(experiment.input_source, wiring.external_indices))
+    build_system = partial(instantiate_robot, fmus, additional=additional, start=float(experiment.times[0]))
     if call_timeout is not None:
-        build_system = partial(instantiate_robot, fmus, additional=additional)
         return simulate_isolated(build_system, experiment, wiring.outputs, recorder, progress, call_timeout)
-    with defer_interrupts() as raise_interrupt, instantiate_robot(fmus, additional=additional) as graph:
+    with defer_interrupts() as raise_interrupt, build_system() as graph:
 
         def report_progress(done: float) -> None:
             raise_interrupt()

@@ -52,13 +52,17 @@ ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class _SspComponent:
-    """An SSP component: its name and FMU, the FMU's variables by name, its connectors and their units."""
+    """An SSP component: its name and FMU, the FMU's variables by name, its connectors and their units.
+
+    ``start_values`` take the place of the FMU's own.
+    """
 
     name: str
     path: Path
     description: ModelDescription
     variables: Mapping[str, ScalarVariable]
     connectors: Mapping[str, str]
+    start_values: Mapping[str, float]
 
     def unit_attributes(self, unit: str) -> dict[str, str]:
         """The attributes of a unit's BaseUnit element, as the FMU defines it."""
@@ -104,17 +108,18 @@ def _ssp_components(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _SspCom
     for port in ports:
         names[port.component][port.variable] = None
     return {
-        name: _ssp_component(name, path, names[name], slot_ports(name, len(fmus.cables), fmus.is_rigid))
-        for name, path in fmus.by_component.items()
+        name: _ssp_component(name, fmus, names[name], slot_ports(name, len(fmus.cables), fmus.is_rigid))
+        for name in fmus.by_component
     }
 
 
-def _ssp_component(name: str, path: Path, connectors: Iterable[str], ports: Iterable[SlotPort]) -> _SspComponent:
+def _ssp_component(name: str, fmus: RobotFmus, connectors: Iterable[str], ports: Iterable[SlotPort]) -> _SspComponent:
+    path = fmus.by_component[name]
     description = read_model_description(path)
     variables = {variable.name: variable for variable in description.modelVariables}
     default_units = {port.name: port.unit for port in ports}
     units = {connector: unit_of(variables[connector]) or default_units[connector] for connector in connectors}
-    return _SspComponent(name, path, description, variables, units)
+    return _SspComponent(name, path, description, variables, units, fmus.start_values_of(name))
 
 
 def _system_connector_name(port: Port) -> str:
@@ -178,7 +183,12 @@ def _add_component(elements: Element, component: _SspComponent, cable_count: int
     for parameter in parameters:
         number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
         unit = unit_of(parameter)
-        SubElement(number, "ssv:Real", {"value": str(parameter.start)} | ({"unit": unit} if unit else {}))
+        SubElement(
+            number,
+            "ssv:Real",
+            {"value": str(component.start_values.get(parameter.name, parameter.start))}
+            | ({"unit": unit} if unit else {}),
+        )
     _add_unit_list(
         settings,
         "ssv:Units",

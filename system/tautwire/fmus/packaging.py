@@ -57,6 +57,10 @@ class RobotFmus:
         winches = {f"winch_{index}": path for index, path in enumerate(self.winches, start=1) if path is not None}
         return {"platform": self.platform} | winches | cables
 
+    def start_values_of(self, component: str) -> dict[str, float]:
+        """Values that a component is to start with in place of its FMU's; it may have no parameters of these names."""
+        return {**self.user_start_values.get(component, {}), **self.start_settings.get(component, {})}
+
     @property
     def paths(self) -> tuple[Path, ...]:
         """Paths of all FMUs, those of the cables first."""
