@@ -25,9 +25,10 @@ from tautwire.control import (
     speed_controller,
     state_space_controller,
 )
-from tautwire.control.controller_fmu import ControllerFmuError
+from tautwire.control.controller_fmu import ControllerFmu, ControllerFmuError, Sample
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.errors import ArgumentError
+from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.trajectory import Line
 from tests.support.pythonfmu_command import build_by_command
@@ -89,7 +90,7 @@ def dot(row, values):
 
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
-    return build_fmus(ROBOT, tmp_path_factory.mktemp("three"))
+    return build_fmus(ROBOT, tmp_path_factory.mktemp("three"), native=True)
 
 
 def lqg() -> Any:
@@ -262,3 +263,22 @@ def test_fmus_that_do_not_fit_are_refused(fmus: RobotFmus, tmp_path: Path) -> No
         closed_loop(fmus, wrong_output)
     with pytest.raises(ArgumentError, match="there is no file"):
         closed_loop(fmus, tmp_path / "absent.fmu")
+
+
+def test_an_fmu_whose_initialization_fails_is_freed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    controller = ControllerFmu(lqg_fmu(tmp_path), 3)
+    closed: list[str] = []
+    close = Component.close
+
+    def fail(component: Component) -> None:
+        raise ComponentError(component.name, "fmi2ExitInitializationMode", "error", 0.0, {}, ())
+
+    def note(component: Component) -> None:
+        closed.append(component.name)
+        close(component)
+
+    monkeypatch.setattr(Component, "run", fail)
+    monkeypatch.setattr(Component, "close", note)
+    with pytest.raises(ComponentError):
+        controller.speeds(Sample(0.0, 0.01, [0.0] * 6, np.zeros(6), np.zeros(3)))
+    assert closed == ["controller"]

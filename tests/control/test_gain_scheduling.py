@@ -34,7 +34,7 @@ def three() -> Robot:
 
 @pytest.fixture(scope="module")
 def three_example_fmus(three: Robot, tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
-    return build_fmus(three, tmp_path_factory.mktemp("schedule"))
+    return build_fmus(three, tmp_path_factory.mktemp("schedule"), native=True)
 
 
 def asked(robot: Robot, design: Design, samples: int) -> Array:

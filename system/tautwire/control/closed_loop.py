@@ -21,7 +21,14 @@ from ..cosimulation.robot_cosimulation import (
     run_cosimulation,
     wire_fmus,
 )
-from ..cosimulation.robot_wiring import ORIENTATION_AXES, PLATFORM, measured_output_indices, winch_input_ports
+from ..cosimulation.robot_wiring import (
+    ORIENTATION_AXES,
+    PLATFORM,
+    RobotWiring,
+    measured_output_indices,
+    result_columns,
+    winch_input_ports,
+)
 from ..cosimulation.run_arguments import validate_fmus, validate_options
 from ..errors import ArgumentError, InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
@@ -39,6 +46,7 @@ from ..validation import (
 from .design import ControlAim, Design
 from .external_controller import SpeedLaw, designed, path_source
 from .feedforward import Reference, elastic_reference
+from .input_sources import AllColumnsSource, JoinedSources, SampledLoad, ZeroInput
 from .path_controller import controller_data
 
 Array = NDArray[np.float64]
@@ -50,41 +58,6 @@ FORCE_PORTS, MOMENT_PORTS = (
     tuple(Port(PLATFORM, f"{name}{rate}.{axis}") for axis in AXES for rate in ("", "_rate"))
     for name in ("external_force", "external_moment")
 )
-
-
-@dataclass(frozen=True)
-class SampledLoad:
-    """A load on the platform as a zero-order hold: ``loads`` (N, 3) in N or N m, each held to the next sample."""
-
-    loads: Array
-
-    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.cosimulation.Source`."""
-        input_values = np.column_stack([self.loads[index], np.zeros(3)]).ravel()
-        return input_values, input_values
-
-
-@dataclass(frozen=True)
-class ZeroInput:
-    """``count`` inputs that stay zero."""
-
-    count: int
-
-    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.cosimulation.Source`."""
-        return np.zeros(self.count), np.zeros(self.count)
-
-
-@dataclass(frozen=True)
-class JoinedSources:
-    """Concatenates the inputs of several sources."""
-
-    sources: tuple[InputSource, ...]
-
-    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.cosimulation.Source`."""
-        pairs = [source.interval(index, time, step, outputs) for source in self.sources]
-        return np.concatenate([start for start, _ in pairs]), np.concatenate([end for _, end in pairs])
 
 
 def sample_times(period: float, duration: float) -> Array:
@@ -139,7 +112,7 @@ def cosimulate_closed_loop(
 
     Raises ControllerError where a function fails, UnreachableError where the path requires a cable to push,
     StretchError where no speeds follow it, RunError where an FMU fails, ControllerFmuError where a controller FMU does
-    not fit, InputError where an FMU lacks a tension output or robot, controller and FMUs do not match, ArgumentError
+    not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not match, ArgumentError
     for an invalid argument.
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
@@ -151,13 +124,17 @@ def cosimulate_closed_loop(
     if options.seed is not None:
         validate_integer(f"{caller}: seed", options.seed, 0, "give a whole number, or None for no noise")
     _require_cables(fmus, robot, controller)
-    _require_tensions(fmus, robot)
+    wiring = wire_fmus(fmus)
+    _require_measured(wiring, robot.name, len(fmus.cables), fmus.is_rigid)
     validate_options(caller, options.step, None, options.progress, options.patience)
     times = sample_times(controller.aim.period, duration)
     if options.reference is not None:
         _require_reference(caller, options.reference, len(times), robot)
     loads, ports = _external_loads(caller, options, len(times), fmus.is_rigid)
-    with path_source(robot, controller, trajectory, times, options.seed, options.reference) as source:
+    with path_source(robot, controller, trajectory, times, options.seed, options.reference) as path_controller:
+        source = AllColumnsSource(
+            path_controller, wiring.output_indices, len(wiring.outputs) + len(wiring.missing_columns)
+        )
         extra = AdditionalComponents(external_inputs=ports) if loads else NO_ADDITIONAL_COMPONENTS
         return _run(fmus, JoinedSources((source, *loads)) if loads else source, times, options, extra)
 
@@ -248,7 +225,9 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
     orientation = [f"orientation.{part}" for part in ORIENTATION_AXES] if fmus.is_rigid else []
     tensions = [f"tension_{i}" for i in range(1, count + 1)]
     input_names = [*(f"position.{axis}" for axis in AXES), *orientation, *tensions]
-    measured_ports = [wiring.outputs[index] for index in measured_output_indices(count, fmus.is_rigid)]
+    _require_measured(wiring, "controller_wires: fmus", count, fmus.is_rigid)
+    port_of = dict(zip(wiring.output_indices, wiring.outputs, strict=True))
+    measured_ports = [port_of[index] for index in measured_output_indices(count, fmus.is_rigid)]
     output_names = [f"{name}_{i}" for i in range(1, count + 1) for name in ("winch_speed", "winch_acceleration")]
     target_ports = winch_input_ports(count, fmus.winch_numbers)
     return (
@@ -318,9 +297,11 @@ def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
         raise InputError(robot.name, f"has another platform than the FMUs, {turning}", "give those of one robot")
 
 
-def _require_tensions(fmus: RobotFmus, robot: Robot) -> None:
-    missing = [name for name in wire_fmus(fmus).missing_columns if name.startswith("tension")]
+def _require_measured(wiring: RobotWiring, where: str, cable_count: int, is_rigid: bool) -> None:
+    """Raises InputError where no FMU has an output that a controller measures."""
+    columns = result_columns(cable_count, is_rigid=is_rigid)[1:]
+    measured = (columns[index].name for index in measured_output_indices(cable_count, is_rigid))
+    missing = [name for name in measured if name in wiring.missing_columns]
     if missing:
-        raise InputError(
-            robot.name, f"the controller needs {', '.join(missing)}, which no FMU outputs", "add the output to an FMU"
-        )
+        problem = f"the controller needs {', '.join(missing)}, which no FMU outputs"
+        raise InputError(where, problem, "add the output to an FMU")

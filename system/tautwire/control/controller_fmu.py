@@ -77,9 +77,8 @@ class ControllerFmu:
         component, inputs, outputs = self._loaded or self._load()
         inputs.values[:] = [values[signal] for signal in self.inputs.values()]
         if self._loaded is None:
-            component.write(inputs)
-            component.run()
-        self._loaded = component, inputs, outputs
+            _initialize(component, inputs)
+            self._loaded = component, inputs, outputs
         if inputs.count:
             component.write(inputs)
         component.step(sample.time, sample.period)
@@ -99,8 +98,18 @@ class ControllerFmu:
 
     def _load(self) -> tuple[Component, VariableBlock, VariableBlock]:
         component = Component("controller", self.path)
-        component.initialize(0.0, {})
         return component, component.block(list(self.inputs)), component.block(self._output_names)
+
+
+def _initialize(component: Component, inputs: VariableBlock) -> None:
+    """Initialize a controller with its first inputs, and free it where that fails."""
+    try:
+        component.initialize(0.0, {})
+        component.write(inputs)
+        component.run()
+    except BaseException:
+        component.close()
+        raise
 
 
 def _numbered(name: str, cable_count: int) -> list[str]:

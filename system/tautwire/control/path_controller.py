@@ -130,7 +130,7 @@ class PathController:
         return np.array(self._speeds)
 
     def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.cosimulation.Source`; ``index`` counts the controller's samples."""
+        """See :class:`tautwire.cosimulation.InputSource`; ``index`` counts the controller's samples."""
         if step > 0.0:
             self._take_sample(index, outputs)
         begin, rate = (
