@@ -21,6 +21,8 @@ from tautwire.materials import (
 )
 from tautwire.materials.material_files import material_document, material_figure
 from tautwire.materials.material_report import verdict_notes, verdict_sentence
+from tautwire.materials.material_table import MaterialRow
+from tautwire.materials.material_verdict import MaterialOptions
 from tautwire.materials.robot_material import declared_material
 from tautwire.materials.viscoelastic_model import Material, MaxwellBranch
 from tests.support.materials import CONSTANT, observed, written
@@ -121,6 +123,30 @@ def test_the_static_test_was_foreseen_by_relaxation(measured: MaterialVerdict) -
     robot = measured.model("robot")
     assert abs(robot.material.modulus - 102.2e9) < 2.2e9
     assert robot.chi_squared < measured.model("relaxation").chi_squared + 0.2
+
+
+@pytest.mark.validate
+def test_uncertainties_of_two_deviations_are_twice_those_of_one(measured: MaterialVerdict) -> None:
+    """The paper's table with all of them doubled, static rows included."""
+
+    def doubled(row: MaterialRow) -> MaterialRow:
+        quantities = {
+            name: replace(each, uncertainty=each.uncertainty and 2.0 * each.uncertainty)
+            for name, each in row.quantities.items()
+        }
+        return replace(row, quantities=quantities)
+
+    table = replace(
+        measured.table,
+        rows=tuple(map(doubled, measured.table.rows)),
+        static_rows=tuple(map(doubled, measured.table.static_rows)),
+    )
+    declared = pair_of_row(measured.table, PAPER_PAIR_FREQUENCY)
+    found = trace_material(table, declared, MaterialOptions(coverage_factor=2.0))
+    for role in ("chosen", "relaxation", "robot"):
+        assert found.model(role).chi_squared == pytest.approx(measured.model(role).chi_squared, rel=1e-6)
+    uncertainties = [[check.uncertainty for check in each.static_checks] for each in (found, measured)]
+    assert uncertainties[0] == pytest.approx(uncertainties[1])
 
 
 def test_the_document_reads_like_a_trace(measured: MaterialVerdict) -> None:

@@ -75,3 +75,8 @@ def test_static_rows_are_added_on_request() -> None:
     with_static = seen.with_static_rows(TABLE)
     assert with_static.measurement_count == 13
     assert (with_static.static_modulus[0], with_static.static_modulus_uncertainty[0]) == (102.2e9, 2.2e9)
+
+
+def test_static_rows_are_covered_by_as_many_deviations_as_the_others() -> None:
+    once, twice = (observations_from_table(TABLE, POLAR).with_static_rows(TABLE, factor) for factor in (1.0, 2.0))
+    assert twice.static_modulus_uncertainty == pytest.approx(0.5 * once.static_modulus_uncertainty)

@@ -89,7 +89,7 @@ def _error_readings(
     if options.coverage_factor != TWO_SIGMA_COVERAGE:
         yield "uncertainties are two standard deviations", read(coverage=TWO_SIGMA_COVERAGE)
     if table.static_rows:
-        yield "static rows fitted too", read().with_static_rows(table)
+        yield "static rows fitted too", read().with_static_rows(table, options.coverage_factor)
 
 
 def pair_of_row(table: MaterialTable, frequency: float) -> Material:
@@ -118,7 +118,7 @@ def trace_material(
     pair = options.pair or table.modulus_pairs()[0]
     observations = observations_from_table(table, pair, options.shared_variance, options.coverage_factor)
     selection = select_model(observations, options.significance_level, progress)
-    models = _evaluated_models(table, observations, selection, declared, options.significance_level, progress)
+    models = _evaluated_models(table, observations, selection, declared, options, progress)
     by_role = {model.role: model for model in reversed(models)}
     reference, chosen = models[0], by_role["chosen"]
     effects = _identified_effects(selection, chosen, declared, options.significance_level)
@@ -142,7 +142,7 @@ def trace_material(
         adequate_after=accepted.p_value >= options.significance_level,
         consistency_checks=consistency_checks(table),
         error_assumptions=error_assumptions(table, pair, options, _compared_structures(selection)),
-        static_checks=tuple(_static_checks(table, by_role)),
+        static_checks=tuple(_static_checks(table, by_role, options.coverage_factor)),
         relaxation_floor=relaxation_floor(observations),
         seconds=time.perf_counter() - start_time,
     )
@@ -166,7 +166,7 @@ def _evaluated_models(
     observations: ModulusObservations,
     selection: ModelSelection,
     declared: Material | None,
-    significance_level: float,
+    options: MaterialOptions,
     progress: Progress,
 ) -> list[EvaluatedModel]:
     """Evaluate all models that a report compares, the declared pair first."""
@@ -174,7 +174,7 @@ def _evaluated_models(
         ("constant", selection.best_fits[CONSTANT_PAIR]),
         ("relaxation", selection.best_fits[LINEAR_VISCOELASTIC]),
         ("chosen", selection.fit),
-        *(("rival", selection.best_fits[rival]) for rival in selection.confusable_models(significance_level)),
+        *(("rival", selection.best_fits[rival]) for rival in selection.confusable_models(options.significance_level)),
     ]
     models = [evaluate_model(observations, "declared", CONSTANT_PAIR.label, declared)] if declared else []
     for index, (role, fit) in enumerate(fits):
@@ -182,7 +182,7 @@ def _evaluated_models(
         models.append(evaluate_fit(observations, role, fit, declared, cross_validate(observations, fit.structure)))
     progress("fitting the form of a robot file", 0.0)
     robot_fit = (
-        best_linear_fit(observations.with_static_rows(table))
+        best_linear_fit(observations.with_static_rows(table, options.coverage_factor))
         if table.static_rows
         else selection.best_fits[LINEAR_VISCOELASTIC]
     )
@@ -241,10 +241,12 @@ def _errors_by_use(observations: ModulusObservations, model: EvaluatedModel) -> 
     return {"fit": fit_errors(observations, model), "check": prediction_errors(observations, model)}
 
 
-def _static_checks(table: MaterialTable, models: dict[Role, EvaluatedModel]) -> Iterator[StaticCheck]:
+def _static_checks(
+    table: MaterialTable, models: dict[Role, EvaluatedModel], coverage_factor: float
+) -> Iterator[StaticCheck]:
     """Check the table's static rows against the long-term moduli of models that were not fitted to them."""
     for row in table.static_rows:
         measured = row.quantities["storage_modulus"]
         for role in ("constant", "relaxation", "chosen"):
             predicted = models[role].estimates[0]
-            yield StaticCheck(role, measured.value, float(measured.uncertainty or 0.0), predicted)
+            yield StaticCheck(role, measured.value, float(measured.uncertainty or 0.0) / coverage_factor, predicted)

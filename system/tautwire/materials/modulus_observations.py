@@ -90,13 +90,13 @@ class ModulusObservations:
             amplitude=self.amplitude[row_indices],
         )
 
-    def with_static_rows(self, table: MaterialTable) -> ModulusObservations:
-        """The observations together with the table's static rows."""
+    def with_static_rows(self, table: MaterialTable, coverage_factor: float = 1.0) -> ModulusObservations:
+        """The observations together with the table's static rows, whose uncertainties are so many deviations."""
         quantities = [row.quantities["storage_modulus"] for row in table.static_rows]
         return replace(
             self,
             static_modulus=np.array([quantity.value for quantity in quantities], dtype=float),
-            static_modulus_uncertainty=np.array([quantity.uncertainty for quantity in quantities], dtype=float),
+            static_modulus_uncertainty=np.array([quantity.uncertainty for quantity in quantities]) / coverage_factor,
         )
 
 
