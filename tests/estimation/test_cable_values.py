@@ -42,6 +42,7 @@ def selected(
     return context, SelectionResult((DRUM,), (evidence,), fit, (), ())
 
 
+@pytest.mark.validate
 def test_cables_that_differ_get_values_of_their_own() -> None:
     ratios = (0.95, 0.97, 0.96)
     context, shared = selected(ratios)

@@ -13,8 +13,7 @@ import tautwire
 from tautwire import estimation
 from tautwire.cli import run
 from tautwire.estimation import parameter_fit, profile_likelihood
-from tests.support.recordings import recorded
-from tests.support.robots import EXAMPLES, example
+from tests.support.robots import EXAMPLES
 
 OWN = Path(tautwire.__file__).parent
 MAX_CALLS = 12
@@ -62,13 +61,3 @@ def test_the_optimiser_is_at_most_twelve_calls_from_the_command(
     deepest = max(paths, key=len)
     assert deepest[-1] == "parameter_fit.fit_from"
     assert len(deepest) <= MAX_CALLS, " -> ".join(deepest)
-
-
-@pytest.mark.validate
-def test_alternatives_and_intervals_are_no_deeper(paths: set[Calls]) -> None:
-    effects = {"payload": {"mass": 6.0}, "relaxation": {"modulus": 2e9, "time": 5.0}}
-    estimation.trace(example("three"), recorded("three", 4, effects), recorded("three", 54, effects))
-    outer_calls = 2
-    assert {path[-1] for path in paths} == {"parameter_fit.fit_from", "profile_likelihood._profile_point"}
-    deepest = max(paths, key=len)
-    assert outer_calls + len(deepest) <= MAX_CALLS, " -> ".join(deepest)

@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.estimation.candidate_fits import coarse_validation_likelihood, fit_at_another_optimum, fit_model
+from tautwire.estimation.candidate_fits import (
+    ValidatedFit,
+    coarse_validation_likelihood,
+    fit_at_another_optimum,
+    fit_candidates,
+    fit_model,
+)
 from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import OrnsteinUhlenbeck
 from tautwire.estimation.disturbance_posterior import disturbance_prior
@@ -15,8 +21,9 @@ from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fitter, NoFitError
+from tautwire.estimation.parameter_fit import Fit, Fitter, NoFitError
 from tautwire.estimation.policy import SelectionPolicy
+from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -48,6 +55,7 @@ def with_hysteresis(force: float, yield_strain: float) -> Robot:
     return ROBOT.with_effect(EffectSetting("hysteresis", values, ROBOT.cable_numbers))
 
 
+@pytest.mark.validate(but=["fitted1", "fitted2"])
 @pytest.mark.parametrize(("fitted", "is_astray"), [((10.0, 7e-5), True), ((1e4, 1e-3), True), ((300.0, 1.2e-4), False)])
 def test_a_hysteresis_that_a_large_disturbance_led_astray_is_found_at_its_own_optimum(
     fitted: tuple[float, float], is_astray: bool
@@ -74,3 +82,19 @@ def test_an_optimum_that_cannot_be_reached_from_anywhere_is_none() -> None:
     weightless = ROBOT.with_effect(EffectSetting("payload", {"mass": -2.0 * ROBOT.platform.mass}, ()))
     task = FitTask((payload,), (weightless,), -np.inf, 1e-4)
     assert fit_at_another_optimum(fitter, task, data, SelectionPolicy()) is None
+
+
+@pytest.mark.parametrize("ending", [(0, 1, 2), (2, 1, 0), (1, 2, 0)])
+def test_the_first_fit_that_leaves_noise_is_enough_whichever_ends_first(
+    ending: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The second of three leaves noise, and the third, which a quicker machine might not have begun."""
+    noise = estimate_noise(ROBOT, RECORDING)
+    context = IdentificationContext(ROBOT, Fitter(noise), split_data(ROBOT, noise, RECORDING, None))
+    tried = hypotheses(ROBOT)[:3]
+    fit = Fit.without_parameters(ROBOT)
+    validated = [ValidatedFit(fit, 10.0, mean_square, np.nan) for mean_square in (9.0, 1.0, 1.0)]
+    monkeypatch.setattr(WorkerPool, "map_unordered", lambda *_: ((k, validated[k]) for k in ending))
+    tasks = {h: FitTask((h,), (ROBOT,), -np.inf, 1e-4) for h in tried}
+    scores = fit_candidates(context, "round 1", tasks, context.split.estimation, 0.0, stop_at_first=True)
+    assert list(scores) == list(tried[:2])

@@ -123,6 +123,7 @@ def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
     assert under_small[payload].values["mass"] == pytest.approx(3.0, rel=0.2)
 
 
+@pytest.mark.validate
 def test_a_long_delay_is_predicted_although_the_slope_asks_for_a_short_one() -> None:
     robot, recording = example("three"), recorded("three", 1, {"sensor_delay": {"seconds": 0.17}}).first(600)
     noise = estimate_noise(robot, recording)

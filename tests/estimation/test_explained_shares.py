@@ -13,6 +13,7 @@ from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.explained_shares import (
     amplitude_spread,
+    as_declared,
     missed_with_effects,
     missed_without_effects,
     remaining_error,
@@ -39,6 +40,7 @@ FITTER = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).media
 LOADED = ROBOT.with_effect(EffectSetting("payload", {"mass": 12.0}))
 
 
+@pytest.mark.validate(but=["friction", "sensor_delay"])
 @pytest.mark.parametrize(
     ("effect", "values", "max_position_error"),
     [
@@ -168,3 +170,21 @@ def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_mis
     left = missed_with_effects(FITTER, LOADED, SPLIT.validation, floor)
     assert missed > 50.0
     assert left < 0.02 * missed
+
+
+@pytest.mark.parametrize("cables", [(1, 2, 3), (2,)])
+def test_without_an_effect_the_robot_has_what_its_file_declares(cables: tuple[int, ...]) -> None:
+    declared = ROBOT.with_effect(EffectSetting("friction", {"coefficient": 0.02}, (1, 2, 3)))
+    payload = EffectSetting("payload", {"mass": 12.0})
+    fitted = declared.with_effect(payload).with_effect(EffectSetting("friction", {"coefficient": 0.05}, cables))
+    accepted = [Hypothesis(BY_NAME["payload"], ()), Hypothesis(BY_NAME["friction"], cables)]
+    coefficients = {
+        cable: setting.values["coefficient"]
+        for setting in as_declared(fitted, "friction", accepted, declared).effects
+        if setting.name == "friction"
+        for cable in setting.cables
+    }
+    assert coefficients == {1: 0.02, 2: 0.02, 3: 0.02}
+    assert as_declared(fitted, "payload", accepted, declared).effects == tuple(
+        setting for setting in fitted.effects if setting.name != "payload"
+    )

@@ -1,21 +1,22 @@
 """What a recording could have shown, held to what fits of recordings with something in them really gain."""
 
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 import pytest
 
+from tautwire.estimation import identifiability
 from tautwire.estimation.effect_sensitivities import SensitivityColumn
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
-from tautwire.estimation.identifiability import analyse_identifiability, separation_nats
+from tautwire.estimation.identifiability import analyse_identifiability, column_indices, separation_nats
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import ScoreStatistics
 from tautwire.estimation.trace_result import Detectable, Identifiability
 from tautwire.robot.schema import Robot
-from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION, SLACK
+from tautwire_fmu.laws.effects import DAMPING, DRUM, MODULUS, PAYLOAD, RELAXATION, SLACK
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -81,6 +82,7 @@ def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> No
     assert all(0.9 <= each.cosine <= 1.0 and each.nats >= 0.0 for each in found.confusable)
 
 
+@pytest.mark.validate
 def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
     found = separation_beside(Hypothesis(MODULUS, ALL), 1.12e11)
     assert found.confusable[0].other == RELAXATION.name
@@ -110,3 +112,25 @@ def test_several_steps_are_separated_from_an_effect_at_once() -> None:
     statistics = ScoreStatistics(columns, np.zeros(2), np.array([[2.0, 1.0], [1.0, 2.0]]), np.zeros(2))
     steps = np.array([[1.0, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
     assert separation_nats(statistics, steps, payload) == pytest.approx([0.75, 0.0, 3.0, 0.0])
+
+
+def test_columns_of_an_effect_are_found_in_whatever_order_the_robot_has_them() -> None:
+    drum = Hypothesis(DRUM, ALL, ("radius_ratio", "slip"))
+    columns = [SensitivityColumn("drum", ALL, name, 0) for name in drum.form]
+    columns += [SensitivityColumn("payload", (), "mass", 0), SensitivityColumn("damping", ALL, "damping", 0)]
+    statistics = ScoreStatistics(tuple(columns), np.zeros(4), np.eye(4), np.zeros(4))
+    assert column_indices(statistics, [Hypothesis(PAYLOAD, ()), drum]) == [[2], [0, 1]]
+
+
+@pytest.mark.parametrize("parameter", ["position_delay", "tension_time_constant", "tension_delay"])
+def test_a_size_that_is_found_by_runs_is_that_of_its_own_form(parameter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[Hypothesis] = []
+
+    def value(_: object, __: object, ___: object, hypothesis: Hypothesis, *____: object) -> float:
+        tried.append(hypothesis)
+        return 0.5
+
+    monkeypatch.setattr(identifiability, "detectable_value", value)
+    unseen = Detectable("sensor_delay", ALL, parameter, inf, "s", {})
+    found = identifiability._detectable_by_simulation(None, THREE, (), unseen, 1.0)  # type: ignore[arg-type]
+    assert found.size == 0.5 and [hypothesis.form for hypothesis in tried] == [(parameter,)]

@@ -39,16 +39,6 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
     assert found.robot_before == example("three")
 
 
-def test_what_was_found_comes_with_its_correlations() -> None:
-    # Load cells that show too much weigh like a heavier platform.
-    hidden = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
-    found = trace(example("three"), recorded("three", 3, hidden))
-    assert {effect.name for effect in found.effects} == {"payload", "sensor_gain"}
-    (correlation,) = found.correlations
-    assert {each.name for each in correlation.between} == {"payload", "sensor_gain"}
-    assert -1.0 < correlation.value < -0.9
-
-
 def beside_disturbance(verdict: str, effects: Sequence[FoundEffect], small: Sequence[FoundEffect] = ()) -> Any:
     """As much of a state as its notes on a disturbance are made of."""
     fitter = SimpleNamespace(noise=SimpleNamespace(disturbance=NEUTRAL))

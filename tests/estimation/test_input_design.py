@@ -1,17 +1,20 @@
 """A program that tells effects apart, within its limits."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tautwire.cli import run
+from tautwire.errors import InputError
 from tautwire.estimation import input_design, worker_pool
 from tautwire.estimation.excitation_limits import ExcitationLimits, default_limits
 from tautwire.estimation.input_design import DesignOptions, ExcitationError, design_excitation, effects_by_name
 from tautwire.estimation.multisine import MultisinePath
 from tautwire.robot.pose_trajectory import PoseTrajectory
 from tautwire.robot.reference_simulation import integrate
+from tautwire.robot.schema import Robot, Sensors
 from tests.support.rigid_robots import crane_robot, octahedral_robot
 from tests.support.robots import EXAMPLES, example
 
@@ -91,7 +94,8 @@ def test_effects_that_cannot_be_told_apart_are_refused(
 
 @pytest.mark.validate
 def test_a_platform_that_six_cables_turn_is_turned_too() -> None:
-    robot = octahedral_robot()
+    noises = Sensors(position_noise=2e-4, tension_noise=1.0, orientation_noise=1e-3)
+    robot = replace(octahedral_robot(), sensors=noises)
     limits = default_limits(robot)
     effects = effects_by_name(robot, "damping,inertia")
     found = design_excitation(robot, effects, DesignOptions(limits, 2.0, 0.05, 1), quiet)
@@ -100,6 +104,20 @@ def test_a_platform_that_six_cables_turn_is_turned_too() -> None:
     assert np.max(np.abs(rotation)) > 0.001 and not np.any(rotation[[0, -1]])
     assert np.max(np.abs(found.winch_speed)) <= limits.speed
     assert found.pairs[0].nats > 0.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "missing"),
+    [
+        (octahedral_robot(), "position_noise and tension_noise and orientation_noise are not"),
+        (replace(THREE, sensors=replace(THREE.sensors, tension_noise=0.0)), "tension_noise is not"),
+    ],
+)
+def test_a_robot_whose_noise_is_not_declared_is_refused(robot: Robot, missing: str) -> None:
+    """Noise estimated from what a simulation leaves would make the wildest program the best one."""
+    effects = effects_by_name(robot, "damping,relaxation")
+    with pytest.raises(InputError, match=rf"\[sensors\] of {robot.name}: {missing} declared"):
+        design_excitation(robot, effects, DesignOptions(default_limits(robot), 2.0, 0.05, 1), quiet)
 
 
 def test_rotations_stay_within_their_limit_and_shrink_with_the_path() -> None:

@@ -1,9 +1,11 @@
 """Innovations against what a Kalman filter must do."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
@@ -190,3 +192,24 @@ def test_a_run_can_be_ended_at_each_of_its_segments() -> None:
     assert len(next(segments).results.values) == 500
     with pytest.raises(KeyboardInterrupt):
         next(segments)
+
+
+@pytest.mark.parametrize(("outputs", "quantity"), [("position", "position"), ("all", "tension")])
+@pytest.mark.parametrize("is_kept", [lambda rows: rows % 2 == 0, lambda rows: rows % 7 != 3], ids=["half rate", "gaps"])
+def test_a_late_sensor_that_misses_samples_is_most_probable_at_its_delay(
+    outputs: str, quantity: str, is_kept: Callable[[NDArray[np.int_]], NDArray[np.bool_]]
+) -> None:
+    robot, whole = example("three"), recorded("three", 3, {"sensor_delay": {"seconds": 0.06, "outputs": outputs}})
+    samples = getattr(whole, quantity).copy()
+    samples[~is_kept(np.arange(len(samples)))] = np.nan
+    recording = replace(whole, **{quantity: samples})
+    setting = EffectSetting("sensor_delay", {"tension_delay": 0.0, "position_delay": 0.0}, (1, 2, 3))
+    free = [FreeParameter(0, "tension_delay"), FreeParameter(0, "position_delay")]
+    likelihood = Likelihood(robot.with_effect(setting), free, estimate_noise(robot, whole), 0.02)
+    rows = np.ones(len(samples), dtype=bool)
+    tension_delay = 0.06 if outputs == "all" else 0.0
+    late, punctual = (likelihood.innovations(recording, values) for values in ([tension_delay, 0.06], [0.0, 0.0]))
+    count = np.isfinite(np.hstack([recording.position, recording.tension])).sum(axis=0)
+    assert late.observed.sum(axis=0).tolist() == punctual.observed.sum(axis=0).tolist() == count.tolist()
+    assert late.log_likelihood(rows) > punctual.log_likelihood(rows) + 100.0
+    assert late.overall_mean_square(rows) == pytest.approx(1.0, abs=0.1)

@@ -29,9 +29,9 @@ def likelihood() -> Likelihood:
 
 
 def test_few_rows_have_the_cost_gradient_and_curvature_of_all() -> None:
-    sparse = RECORDING.position.copy()
-    sparse[::7, 1] = np.nan
-    recording = replace(RECORDING, position=sparse)
+    position, tension = RECORDING.position.copy(), RECORDING.tension.copy()
+    position[::7, 1], tension[::5, 2] = np.nan, np.nan
+    recording = replace(RECORDING, position=position, tension=tension)
     whole = likelihood()
     residuals, slopes = compressed_residuals(whole, VALUES, DataSet(recording, (0.0, 0.0, 0.0), ROWS), 0.1)
     assert residuals.shape == (4,) and slopes.shape == (4, 3)

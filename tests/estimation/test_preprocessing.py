@@ -6,16 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.estimation import preprocessing, speed_versions, trace
-from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
-from tautwire.estimation.estimation_data import DataSplit
-from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation import speed_versions, trace
 from tautwire.estimation.preprocessing import PreparedData, prepare_data
-from tautwire.estimation.preprocessing_policy import ClockOffsetPolicy
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.central_differences import may_be_central_differences
 from tautwire.recordings.recording import Recording
-from tautwire.robot.schema import Robot
 from tests.rig import load_robot, wander
 from tests.support.recordings import REACH, recorded
 from tests.support.robots import EXAMPLES, example
@@ -48,20 +43,6 @@ def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they
     assert not told(first) and told(second)
     assert first.split.estimation.recording is recorded("three", 1, {**PAYLOAD, **LATE})
     assert second.split.estimation.recording is not first.split.estimation.recording
-
-
-@pytest.mark.validate
-def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    def always(
-        fitter: Fitter, robot: Robot, evidence: DataSplit, policy: ClockOffsetPolicy
-    ) -> tuple[DataSplit, tuple[str, ...]]:
-        late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
-        return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock offset",)
-
-    monkeypatch.setattr(preprocessing, "with_clocks_set", always)
-    found = trace(THREE, *pair({"damping": {"damping": 9e8}}))
-    assert [effect.name for effect in found.effects] == ["damping"]
-    assert not any("clock" in note for note in found.notes)
 
 
 @pytest.mark.validate

@@ -24,6 +24,7 @@ from tautwire.estimation.score_test import (
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import read_recording
 from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.planar import VERTICAL, planar_case
 from tests.support.recordings import recorded
@@ -41,6 +42,29 @@ def test_what_is_there_has_the_largest_score_and_its_values() -> None:
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
     assert best.effect.name == "payload"
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "declared", "true"),
+    [
+        ("payload", {"mass": 4.0}, {"mass": 1.0}),
+        ("friction", {"coefficient": 0.05}, {"coefficient": 0.03}),
+        ("modulus", {"modulus": 1.1e11}, {"modulus": 1.08e11}),
+    ],
+)
+def test_a_declared_effect_is_expected_to_change_from_its_declared_value(
+    name: str, declared: dict[str, float], true: dict[str, float]
+) -> None:
+    effect = BY_NAME[name]
+    on_all = Hypothesis(effect, () if name == "payload" else ROBOT.cable_numbers)
+    robot = ROBOT.with_effect(EffectSetting(name, effect.completed_values(declared), on_all.cables))
+    data = split_data(robot, NOISE, recorded("three", 1, {name: true}), None).estimation
+    # Single cables beside all of them share the columns of each.
+    candidates = [on_all] if name == "payload" else [on_all, Hypothesis(effect, (2,))]
+    predicted = score_test(robot, (), candidates, Fitter(NOISE), data)[on_all]
+    ((parameter, value),) = true.items()
+    assert predicted.gain > 100.0
+    assert predicted.values[parameter] == pytest.approx(value, abs=0.2 * abs(declared[parameter] - value))
 
 
 def test_sensitivities_of_effects_serve_one_run_after_another() -> None:

@@ -192,6 +192,22 @@ def test_without_a_disturbance_an_effect_of_little_evidence_is_what_the_form_of_
     assert ("friction and sensor_gain; with them, the residual" in sentence) == (not is_small)
 
 
+@pytest.mark.parametrize(
+    ("evidence", "expected", "is_told"),
+    [((2e4, 1e6), "discovered", True), ((1e6, 2e4), "effects", True), ((1e6, 5e3), "effects", False)],
+)
+def test_without_a_disturbance_the_effect_of_most_evidence_decides_whether_the_verdict_is_of_the_list(
+    evidence: tuple[float, float], expected: str, is_told: bool
+) -> None:
+    frame = Hypothesis(BY_NAME["frame"], ROBOT.cable_numbers)
+    robot = ROBOT.with_effect(EffectSetting("frame", {"compliance": 1e-5}, ROBOT.cable_numbers))
+    selection = SelectionResult((hypothesis("friction"), frame), evidence, Fit.without_parameters(robot), (), ())
+    large = selection.substantial(CONTEXT.policy.selection)
+    word, sentence = verdict_of(ROBOT, selection, large, True, None, False)
+    assert word == expected
+    assert ("not on the list of known ones: frame: compliance = 1e-05 m/N." in sentence) == is_told
+
+
 def test_effects_that_nearly_cancel_each_other_get_no_name() -> None:
     of = shares(0.03, 44.0, payload=(0.97, 170.0), sensor_offset=(0.97, 170.0))
     assert verdict(of, "payload", "sensor_offset")[0] == "effects"

@@ -105,7 +105,7 @@ def fit_candidates(
     """Scores of the hypotheses of some tasks, in their order, without those that the cables cannot hold.
 
     ``baseline`` is the log-likelihood of the validation data without them. With ``stop_at_first`` only until one
-    leaves noise. Where time is up, only those that were fitted until then.
+    leaves noise, in their order, not as they end. Where time is up, only those that were fitted until then.
     """
     order, scores = list(tasks), {}
     remaining = dict.fromkeys(order)
@@ -116,17 +116,36 @@ def fit_candidates(
                 hypothesis = order[index]
                 del remaining[hypothesis]
                 context.progress(f"{label}: {hypothesis.label(context.robot)}", done / len(order))
-                if validated is None:
-                    continue
-                gain = validated.log_likelihood - baseline
-                score = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square, validated.explained)
-                scores[hypothesis] = score
-                if stop_at_first and leaves_noise(context, score):
+                if validated is not None:
+                    scores[hypothesis] = _score(hypothesis, validated, baseline)
+                enough = _index_that_leaves_noise(context, order, scores, remaining) if stop_at_first else None
+                if enough is not None:
+                    order = order[: enough + 1]
                     break
     except OutOfTimeError:
         names = ", ".join(hypothesis.label(context.robot) for hypothesis in remaining)
         context.leave_untried(f"fits of {names} ({label})")
     return {hypothesis: scores[hypothesis] for hypothesis in order if hypothesis in scores}
+
+
+def _score(hypothesis: Hypothesis, validated: ValidatedFit, baseline: float) -> CandidateScore:
+    evidence = validated.log_likelihood - baseline
+    return CandidateScore(hypothesis, validated.fit, evidence, validated.mean_square, validated.explained)
+
+
+def _index_that_leaves_noise(
+    context: IdentificationContext,
+    order: Sequence[Hypothesis],
+    scores: Mapping[Hypothesis, CandidateScore],
+    remaining: Collection[Hypothesis],
+) -> int | None:
+    """Index of the first hypothesis that leaves noise, once all before it are fitted."""
+    for index, hypothesis in enumerate(order):
+        if hypothesis in remaining:
+            return None
+        if hypothesis in scores and leaves_noise(context, scores[hypothesis]):
+            return index
+    return None
 
 
 def leaves_noise(context: IdentificationContext, score: CandidateScore) -> bool:

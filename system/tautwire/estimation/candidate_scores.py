@@ -91,7 +91,7 @@ def misfitted_rival(
 def simpler_rival(
     best: CandidateScore, scores: Collection[CandidateScore], policy: SelectionPolicy
 ) -> CandidateScore | None:
-    """Strongest candidate of fewer parameters than the best one, if it comes near it."""
+    """Strongest candidate with fewer parameters than the best one, if its evidence comes near."""
     simpler = [score for score in scores if score.parameter_count < best.parameter_count]
     rival = max(simpler, key=lambda score: score.evidence, default=None)
     return rival if rival and rival.evidence >= policy.min_simpler_evidence_ratio * best.evidence else None

@@ -1,17 +1,17 @@
-"""Sensitivities of the innovations to an effect that is absent: how it would begin to act along a filter's run.
+"""Sensitivities of the innovations to an effect: how it would begin to act, or to change, along a filter's run.
 
 With the effect's states ``z`` and their sensitivities ``Z`` to its parameters
 
     dz/dt = g(x, z)        dZ/dt = g_z Z + g_p        d(dx/dt) = f_p + f_z Z        d(outputs) = h_p + h_z Z
 
 are taken along the run's states ``x``, see :mod:`tautwire.estimation.filter_linearisation`: an absent effect moves
-nothing, so it need not be simulated with them.
+nothing, so it need not be simulated with them, and one that the robot file declares is in the run already.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..robot.schema import PER_CABLE_COMPONENTS, Robot
+from ..robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
 from .filter_linearisation import LinearisedSegment
@@ -46,7 +46,7 @@ class SensitivityColumn:
 
 
 class EffectSensitivities:
-    """Sensitivities to one effect, switched on and neutral on each group of cables, beside what a robot has already.
+    """Sensitivities to one effect on each group of cables, as a robot has it there or neutral, beside its others.
 
     ``columns`` (p) name the parameters; ``values`` (p) where they begin; ``start_sensitivities`` (n, p) are those of
     the start.
@@ -65,7 +65,7 @@ class EffectSensitivities:
             cable_groups = [()]
         free, extended_robot, fixed, nominal = [], robot, [], []
         for group in cable_groups:
-            setting = Hypothesis(effect, group).neutral(robot, group)
+            setting = _present_setting(robot, effect, group)
             extended_robot = extended_robot.with_effect(setting)
             index = next(i for i, s in enumerate(extended_robot.effects) if (s.name, s.cables) == (effect.name, group))
             # What all cables share of a sensor effect is the platform's: the first one stands for it.
@@ -182,6 +182,13 @@ class EffectSensitivities:
         )
         self._effect_states_now[trial] = (effect_states[:, -1:], sensitivities[:, parameter_count * count :])
         return effect_states, sensitivities
+
+
+def _present_setting(robot: Robot, effect: Effect, cables: tuple[int, ...]) -> EffectSetting:
+    """The effect as a robot has it on some cables; neutral where it has none, or none on all of these."""
+    present = (s for s in robot.effects if s.name == effect.name and set(cables) <= set(s.cables))
+    setting = next(present, None)
+    return replace(setting, cables=cables) if setting else Hypothesis(effect, cables).neutral(robot, cables)
 
 
 def _with_last_column_repeated(columns: Array) -> Array:

@@ -116,7 +116,7 @@ def explained_shares(
     floor = sensor_noise_floor(context.fitter, robot, data)
     at_start = with_initial_state(context.fitter, robot, data)
     names = list(dict.fromkeys(hypothesis.effect.name for hypothesis in accepted))
-    robots = [at_start, *(_without_effect(at_start, name, accepted) for name in names)]
+    robots = [at_start, *(as_declared(at_start, name, accepted, context.robot) for name in names)]
     complete, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
     recording, outputs_without = after.recording, dict(zip(names, without, strict=True))
     missed = missed_without_effects(context, declared, data, floor)
@@ -242,9 +242,19 @@ def sensor_noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     return noise_floor(fitter, robot, data)
 
 
-def _without_effect(robot: Robot, name: str, accepted: Sequence[Hypothesis]) -> Robot:
-    removed = [(name, hypothesis.cables) for hypothesis in accepted if hypothesis.effect.name == name]
-    return replace(robot, effects=tuple(s for s in robot.effects if (s.name, s.cables) not in removed))
+def as_declared(robot: Robot, name: str, accepted: Sequence[Hypothesis], declared: Robot) -> Robot:
+    """A robot without an accepted effect, or with the values that the declared robot has where it has the effect."""
+    removed = [hypothesis.cables for hypothesis in accepted if hypothesis.effect.name == name]
+    others = [s for s in robot.effects if s.name != name or s.cables not in removed]
+    is_declared = [s for s in declared.effects if s.name == name]
+    on_platform = [s for s in is_declared if not s.cables]
+    on_cables = [
+        replace(s, cables=shared)
+        for s in is_declared
+        for cables in removed
+        if (shared := tuple(cable for cable in s.cables if cable in cables))
+    ]
+    return replace(robot, effects=(*others, *on_platform, *on_cables))
 
 
 def _missed(recording: Recording, outputs: Outputs, floor: Errors) -> float:

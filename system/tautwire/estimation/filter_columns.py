@@ -33,6 +33,16 @@ def align_delayed_outputs(time: Array, measured: Array, lags: Array) -> tuple[Ar
     return values, shift
 
 
+def unaligned_samples(is_recorded: NDArray[np.bool_], is_aligned: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """As many cells (N, m) as recorded samples are aligned with no state: the last without one in their column."""
+    unaligned = np.zeros_like(is_recorded)
+    lost_counts = is_recorded.sum(axis=0) - is_aligned.sum(axis=0)
+    for column in np.flatnonzero(lost_counts > 0):
+        free_rows = np.flatnonzero(is_recorded[:, column] & ~is_aligned[:, column])
+        unaligned[free_rows[-lost_counts[column] :], column] = True
+    return unaligned
+
+
 def filter_columns(
     recording: Recording, measured: Array, shift: Array, rotation_columns: int = 0
 ) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:

@@ -9,7 +9,7 @@ Source: Kay (1998), Fundamentals of Statistical Signal Processing II, sec. 4.4; 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 
@@ -23,7 +23,7 @@ from .grid_search import detectable_value
 from .hypotheses import SINGLE_CABLE_EFFECTS, Hypothesis, hypotheses
 from .identification_context import IdentificationContext
 from .policy import IdentifiabilityPolicy
-from .score_test import ScoreStatistics, grid_size, parameter_columns, score_statistics, starting_grid
+from .score_test import ScoreStatistics, cables_of, grid_size, parameter_columns, score_statistics, starting_grid
 from .trace_result import ConfusableEffect, Detectable, Identifiability
 
 Array = NDArray[np.float64]
@@ -41,8 +41,13 @@ def analyse_identifiability(
     statistics = score_statistics(robot, accepted, others, context.fitter, context.split.validation)
     required_norm = _required_norm(context.evidence_threshold(), policy)
     reported = [h for h in others if h.cables in ((), declared.cable_numbers) or h.effect in SINGLE_CABLE_EFFECTS]
-    accepted_columns = [column for group in _column_indices(accepted) for column in group]
-    detectable = [d for h in reported for d in _detectable_sizes(statistics, h, accepted_columns, required_norm)]
+    accepted_columns = [column for group in column_indices(statistics, accepted) for column in group]
+    grids = {h.effect: starting_grid(h.effect, robot, cables_of(h.effect, others)) for h in reported}
+    detectable = [
+        size
+        for h in reported
+        for size in _detectable_sizes(statistics, h, grids[h.effect], accepted_columns, required_norm)
+    ]
     detectable = [_detectable_by_simulation(context, robot, accepted, size, required_norm) for size in detectable]
     confusable = [
         likeness
@@ -87,25 +92,28 @@ def _explained_shares(statistics: ScoreStatistics, steps: Array, other: Hypothes
     return np.minimum(largest_shares, 1.0)
 
 
-def _column_indices(accepted: Sequence[Hypothesis]) -> list[list[int]]:
-    """Column indices of each accepted hypothesis."""
-    column_groups, first = [], 0
-    for hypothesis in accepted:
-        column_groups.append(list(range(first, first + len(hypothesis.form))))
-        first += len(hypothesis.form)
-    return column_groups
+def column_indices(statistics: ScoreStatistics, accepted: Sequence[Hypothesis]) -> list[list[int]]:
+    """Column indices of each accepted hypothesis, whose columns come first, in the order of the robot's effects."""
+    leading = statistics.columns[: sum(len(hypothesis.form) for hypothesis in accepted)]
+    return [
+        [i for i, column in enumerate(leading) if (column.effect, column.cables) == (each.effect.name, each.cables)]
+        for each in accepted
+    ]
 
 
 def _detectable_sizes(
-    statistics: ScoreStatistics, hypothesis: Hypothesis, nuisance: list[int], required_norm: float
+    statistics: ScoreStatistics,
+    hypothesis: Hypothesis,
+    grid: Sequence[Mapping[str, float]],
+    nuisance: list[int],
+    required_norm: float,
 ) -> list[Detectable]:
-    shape_values = starting_grid(hypothesis.effect)[0]
     smallest = {
         p.name: Detectable(hypothesis.effect.name, hypothesis.cables, p.name, inf, p.unit, {})
         for p in hypothesis.parameters
-        if p.name not in shape_values
+        if p.name not in grid[0]
     }
-    for number, shapes in enumerate(starting_grid(hypothesis.effect)[: grid_size(hypothesis)]):
+    for number, shapes in enumerate(grid[: grid_size(hypothesis)]):
         names, columns = parameter_columns(statistics, hypothesis, number)
         projected = _projected_information(statistics.fisher_information, columns, nuisance)
         for index, name in enumerate(names):
@@ -139,7 +147,8 @@ def _detectable_by_simulation(
     parameter = next(p for p in effect.parameters if p.name == detectable.parameter)
     if not parameter.grid_values or detectable.size < inf:
         return detectable
-    hypothesis = Hypothesis(effect, detectable.cables)
+    form = next(form for form in effect.forms if parameter.name in form)
+    hypothesis = Hypothesis(effect, detectable.cables, form)
     return replace(detectable, size=detectable_value(context, robot, accepted, hypothesis, parameter, required_norm))
 
 
@@ -177,7 +186,7 @@ class _TestedEffect:
 def _tested_effects(
     statistics: ScoreStatistics, robot: Robot, declared: Robot, accepted: Sequence[Hypothesis]
 ) -> Iterator[_TestedEffect]:
-    column_groups = _column_indices(accepted)
+    column_groups = column_indices(statistics, accepted)
     for own_columns, hypothesis in zip(column_groups, accepted, strict=True):
         nuisance = [column for group in column_groups if group is not own_columns for column in group]
         step = np.zeros((len(statistics.columns), 1))

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from math import ceil, log2, log10
 
 import numpy as np
@@ -34,9 +33,8 @@ from .excitation_limits import ExcitationLimits, can_turn
 from .filter_linearisation import linearise_filter
 from .hypotheses import Hypothesis, hypotheses
 from .identifiability import separation_nats, start_steps
-from .kalman_filter import Noise
 from .likelihood import Likelihood
-from .measurement_noise import estimate_noise
+from .measurement_noise import declared_noise
 from .multisine import MultisinePath
 from .parameter_fit import Fitter
 from .score_test import effect_sensitivities, statistics_of_runs
@@ -112,7 +110,7 @@ def design_excitation(
 
     Searched by differential evolution.
 
-    Raises ExcitationError where none is within the limits.
+    Raises ExcitationError where none is within the limits, and InputError where the sensors' noise is not declared.
     """
     # On matrices as small as these, threads wait for each other longer than one of them computes.
     with threadpool_limits(1):
@@ -169,7 +167,7 @@ class _DesignProblem:
     options: DesignOptions
     likelihood: Likelihood
     sensitivities: tuple[EffectSensitivities, ...]
-    fitter_for: Callable[[Noise], Fitter]
+    fitter: Fitter
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
@@ -234,9 +232,9 @@ class _DesignProblem:
 
     def separations(self, recording: Recording) -> list[EffectSeparation]:
         """Separations of each effect from each other along a program, the closest first."""
-        fitter = self.fitter_for(estimate_noise(self.robot, recording))
         every_row = np.ones(len(recording.time), dtype=bool)
-        likelihood, values = fitter.likelihood(self.robot, (), DataSet(recording, self.robot.platform.start, every_row))
+        data = DataSet(recording, self.robot.platform.start, every_row)
+        likelihood, values = self.fitter.likelihood(self.robot, (), data)
         runs = linearise_filter(likelihood, values, recording)
         signatures = statistics_of_runs(runs, self.sensitivities, every_row)
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
@@ -260,14 +258,10 @@ class _DesignProblem:
 
 
 def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
-    declared = robot.sensors
-    noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
-    if robot.platform.is_rigid_body:
-        noise = replace(noise, rotation=declared.orientation_noise or 0.0)
+    noise = declared_noise(robot)
     likelihood = Likelihood(robot, (), noise, options.interval)
     sensitivities = effect_sensitivities(robot, effects, likelihood.model.state_names)
-    # Declared noise is the same for all programs: they share what one fitter has compiled.
-    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter))
+    return _DesignProblem(robot, effects, options, likelihood, sensitivities, Fitter(noise))
 
 
 class _InfeasibleError(Exception):

