@@ -14,7 +14,7 @@ from tautwire.campaigns import campaign_runner as writing
 from tautwire.campaigns.campaign_plan import DISTRIBUTION_KINDS, Compute, Distribution
 from tautwire.campaigns.campaign_runner import planned_jobs, run_count
 from tautwire.campaigns.input_sampling import correlated_groups, draw_samples
-from tautwire.campaigns.parameter_space import KeyPathError, expand_key_path, with_values
+from tautwire.campaigns.parameter_space import KeyPathError, expand_key_path, leaves_of, with_values
 from tautwire.campaigns.plan_file import PLAN_KEYS, read_plan
 from tautwire.cli import run as command
 from tautwire.errors import InputError
@@ -243,3 +243,33 @@ def test_the_plan_of_the_page_is_one(tmp_path: Path) -> None:
         assert f"| `{kind}` |" in page
     for key in (*PLAN_KEYS, *(each.name for each in fields(Compute))):
         assert f"`{key}`" in page or f"[{key}]" in page, key
+
+
+def test_a_key_that_overwrites_another_is_refused(tmp_path: Path) -> None:
+    both = '"cable[2].modulus" = {list = [1e11, 1.1e11]}\n"cable.modulus" = {list = [1e11, 1.2e11]}'
+    with pytest.raises(InputError, match=r"vary\.cable\.modulus: varies what cable\[2\]\.modulus varies"):
+        read(tmp_path, sampled(both, "grid"))
+    assert leaves_of(CONTENT, "cable[2].modulus") == {("cable", 1, "modulus")}
+
+
+@pytest.mark.parametrize(
+    "values", ["list = [-280.0, 300.0, 310.0]", "uniform = [-10.0, 400.0]", "linspace = [-9, 300, 4]"]
+)
+def test_the_ends_of_a_distribution_are_tried(values: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"does not suit the robot file, platform\.mass"):
+        read(tmp_path, sampled(f'"platform.mass" = {{{values}}}', "random"))
+
+
+@pytest.mark.parametrize("is_sqlite", [False, True])
+def test_bags_are_recordings_of_a_season_each_by_its_folder(is_sqlite: bool, tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    from tests.support.ros_bags import joint_state, write_bag
+
+    season = tmp_path / "season"
+    (season / "pictures").mkdir(parents=True)
+    states = [(time, joint_state(time, [0.1, 0.2, 0.3])) for time in (1000.0, 1000.1)]
+    folder = write_bag(season / "monday", {"/joint_states": ("sensor_msgs/JointState", states)}, is_sqlite=is_sqlite)
+    trace = read(tmp_path, 'robot = "robot.toml"\n[trace]\nrecordings = "season"').trace
+    assert trace.recordings == (str(folder),)
+    (next(each for each in folder.iterdir() if each.suffix != ".yaml")).write_bytes(b"another")
+    assert read(tmp_path, 'robot = "robot.toml"\n[trace]\nrecordings = "season"').trace.digests != trace.digests

@@ -155,3 +155,24 @@ def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
     values = draw_samples(plan)
     assert values.mean(axis=0) == pytest.approx(fit.values, rel=1e-3)
     assert np.cov(values.T) == pytest.approx(fit.covariance, rel=0.01)
+
+
+def test_what_a_report_has_beside_its_effects_is_noted(tmp_path: Path) -> None:
+    document = {
+        "effects": [effect("damping", ALL, DAMPING)],
+        "correlations": [],
+        "formula": "frame: compliance = 3.3e-07 m/N",
+        "small_effects": [effect("payload", [], MASS)],
+    }
+    (tmp_path / "report.json").write_text(json.dumps(document), encoding="utf-8")
+    assert read(tmp_path, SAMPLED).notes == (
+        "the formula frame: compliance = 3.3e-07 m/N of report.json is left out: its own robot.toml has it",
+        "the effect payload of report.json is left out: its own robot.toml has it",
+    )
+
+
+def test_an_interval_that_ends_at_a_bound_gives_no_deviation(tmp_path: Path) -> None:
+    at_bound = {"value": 2.0e9, "unit": "Pa s", "low": 0.0, "high": 2.1e9}
+    plan = planned(tmp_path, [effect("damping", ALL, at_bound), effect("modulus", [2], MODULUS)], [])
+    assert plan.keys == ("effect.modulus.modulus",)
+    assert plan.notes == ("effect.damping.damping stays at 2e+09: report.json gives it no interval",)

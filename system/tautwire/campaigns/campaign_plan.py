@@ -90,6 +90,14 @@ class Distribution:
             return tuple(np.linspace(first, last, int(count)).tolist())
         return self.numbers if self.kind == LIST else ()
 
+    @property
+    def ends(self) -> tuple[float, ...]:
+        """The least and the largest value of a bounded distribution; empty for others, and for texts."""
+        values = () if self.texts else self.discrete_values
+        if self.kind in (UNIFORM, TRIANGULAR):
+            values = (self.numbers[0], self.numbers[-1])
+        return (min(values), max(values)) if values else ()
+
     def value(self, number: float) -> float | str:
         """The value that a number encodes: the text of that index in a list of texts, else the number."""
         return self.texts[int(number)] if self.texts else number

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from math import ceil, log
+from math import ceil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from tautwire_fmu.laws.effects.slack import SLACK
 
 from ..control import (
     ClosedLoopOptions,
@@ -32,6 +30,7 @@ from ..linear import linearise
 from ..linear.linear_plant import LinearPlant
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
+from ..robot.active_effects import slack_tensions
 from ..robot.platform_symbols import StateIndices
 from ..robot.pose_path import pose_path, sample_poses
 from ..robot.pose_trajectory import PoseTrajectory, rotation_vectors_between, slerp
@@ -289,7 +288,7 @@ def _motion_outputs(robot: Robot, reference_input: ReferenceInput, motion: Cosim
     for cable in robot.cable_numbers:
         row |= {f"tension_{cable}_least": float(min_tension[cable - 1])}
         row |= {f"tension_{cable}_largest": float(max_tension[cable - 1])}
-    row["slack"] = bool(np.any(min_tension <= _slack_tension(robot)))
+    row["slack"] = bool(np.any(min_tension <= slack_tensions(robot)))
     if robot.tension is not None:
         row["limit_broken"] = bool(
             min_tension.min() < robot.tension.minimum or max_tension.max() > robot.tension.maximum
@@ -301,15 +300,6 @@ def _error_outputs(prefix: str, errors: Array) -> Row:
     """Error at the end, largest error, and root mean square, over time."""
     values = {"end": errors[-1], "largest": errors.max(), "rms": np.sqrt(np.mean(errors**2))}
     return {f"{prefix}_{name}": float(value) for name, value in values.items()}
-
-
-def _slack_tension(robot: Robot) -> Array:
-    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
-    tension = np.zeros(robot.cable_count)
-    for setting in robot.effects:
-        if setting.name == SLACK.name:
-            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
-    return tension
 
 
 def _resampled_series(motion: CosimulationResult, point_count: int) -> Series:

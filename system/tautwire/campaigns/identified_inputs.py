@@ -10,6 +10,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tautwire_fmu.laws.effects import BY_NAME
+
 from ..input_files import read_bytes
 from ..robot.robot_file_reader import robot_from_content
 from ..robot.schema import EffectSetting, Robot
@@ -41,10 +43,14 @@ class ParameterName(NamedTuple):
 
 @dataclass(frozen=True)
 class _TraceReport:
-    """Estimates of a report: value and standard deviation, None without an interval; correlations of pairs."""
+    """Estimates of a report: value and standard deviation, None without an interval; correlations of pairs.
+
+    ``omitted`` is what the report's robot file has beside its effects: a formula, and effects too small to matter.
+    """
 
     estimates: Mapping[ParameterName, tuple[float, float | None]]
     correlations: Mapping[frozenset[ParameterName], float]
+    omitted: tuple[str, ...]
 
 
 def identified_inputs(
@@ -62,7 +68,7 @@ def identified_inputs(
     if any((name.effect, name.cables) not in effect_paths for name in report.estimates):
         raise PlanError(str(report_file), "has an effect on a cable twice", REPORT_HINT)
     inputs: dict[ParameterName, Input] = {}
-    notes: list[str] = []
+    notes = [f"{each} of {report_file.name} is left out: its own robot.toml has it" for each in report.omitted]
     for name, (value, deviation) in report.estimates.items():
         path = f"{effect_paths[name.effect, name.cables]}.{name.parameter}"
         if deviation is None:
@@ -83,28 +89,34 @@ def _read_report(report_file: Path) -> _TraceReport:
         estimates = {
             ParameterName(str(effect["name"]), _cable_numbers(effect), str(key)): (
                 _require_finite(each["value"]),
-                _standard_deviation(each),
+                _standard_deviation(str(effect["name"]), str(key), each),
             )
             for effect in document["effects"]
             for key, each in effect["parameters"].items()
         }
         correlations = dict(_correlation_pairs(document))
+        formula, small_effects = document.get("formula"), document.get("small_effects") or ()
+        omitted = ([f"the formula {formula}"] if formula else []) + [f"the effect {e['name']}" for e in small_effects]
     except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as problem:
         raise PlanError(str(report_file), "is not a report of a trace", REPORT_HINT) from problem
     if not estimates:
         raise PlanError(str(report_file), "has no effect whose parameters could vary", "leave [found] out")
-    return _TraceReport(estimates, correlations)
+    return _TraceReport(estimates, correlations, tuple(dict.fromkeys(omitted)))
 
 
 def _cable_numbers(entry: Mapping[str, Any]) -> tuple[int, ...]:
     return tuple(sorted(int(cable) for cable in entry["cables"]))
 
 
-def _standard_deviation(estimate: Mapping[str, Any]) -> float | None:
+def _standard_deviation(effect: str, parameter: str, estimate: Mapping[str, Any]) -> float | None:
+    """Standard deviation of an estimate by its interval; None where that is open, or ends at the parameter's bound."""
     low, high = estimate.get("low"), estimate.get("high")
     if low is None or high is None or not high > low:
         return None
-    return _require_finite(float(high) - float(low)) / (2.0 * NORMAL_QUANTILE_975)
+    deviation = _require_finite(float(high) - float(low)) / (2.0 * NORMAL_QUANTILE_975)
+    declared = BY_NAME[effect].parameters if effect in BY_NAME else ()
+    is_open = any(each.name == parameter and (low <= each.minimum or high >= each.maximum) for each in declared)
+    return None if is_open else deviation
 
 
 def _require_finite(number: Any) -> float:

@@ -14,6 +14,8 @@ from .campaign_plan import DISTRIBUTION_KINDS, LINSPACE, LIST, PARAMETER_NAMES, 
 
 KEY_STEP_PATTERN = re.compile(r"(?P<name>[A-Za-z0-9_-]+)(?:\[(?P<entry>\d+|\*)\])?(?:\[(?P<column>\d+)\])?\Z")
 ALL_ENTRIES = "*"
+# A text that no robot file contains.
+LEAF_MARK = "\0"
 
 
 class KeyStep(NamedTuple):
@@ -66,6 +68,22 @@ def with_values(content: Mapping[str, Any], values: Mapping[str, float | str]) -
     for path, value in values.items():
         _set_value(changed, parse_key_path(path), value)
     return changed
+
+
+def leaves_of(content: Mapping[str, Any], path: str) -> frozenset[tuple[str | int, ...]]:
+    """Leaves of the content, as keys and indices, whose value a key path sets in :func:`with_values`.
+
+    Raises KeyPathError where it leads nowhere.
+    """
+    return frozenset(_marked_leaves(with_values(content, {path: LEAF_MARK})))
+
+
+def _marked_leaves(node: Any) -> Iterator[tuple[str | int, ...]]:
+    entries = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, each in entries:
+        if each == LEAF_MARK:
+            yield (key,)
+        yield from ((key, *leaf) for leaf in _marked_leaves(each))
 
 
 def _set_value(table: dict[str, Any], steps: Sequence[KeyStep], value: float | str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -10,12 +10,10 @@ from typing import Any, NoReturn
 from ..errors import InputError, RobotFileError, format_value
 from ..input_files import read_bytes, require_utf8_text
 from ..name_suggestions import suggest_name
-from ..recordings.recording import read_recording
+from ..recordings.ros_bag import is_bag
 from ..robot.checked_table import CheckedTable
 from ..robot.robot_file_reader import robot_content, robot_from_content
-from ..robot.schema import Platform, Quaternion, Robot
-from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
-from ..robot.trajectory import DURATION_RULE as OF_PATH
+from ..robot.schema import Robot
 from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .campaign_plan import (
@@ -33,17 +31,9 @@ from .campaign_plan import (
 )
 from .identified_inputs import IdentifiedInputs, identified_inputs
 from .input_sampling import correlated_groups, median_value, saltelli_block_size
-from .parameter_space import KeyPathError, read_parameter_space, with_values
+from .parameter_space import KeyPathError, leaves_of, read_parameter_space, with_values
+from .plan_paths import file_digest, file_relative_to_plan, read_path, read_paths
 
-# Narrower than for one run: an error in a plan is repeated in many runs.
-DURATION_RULE = OF_PATH._replace(minimum=1e-3, maximum=1e5)
-UNTIL_RULE = NumberRule("where the recording is left", "s", 1e-3, 1e6)
-HELIX_RULES = {
-    "radius": RADIUS_RULE._replace(positive=True),
-    "rise": RISE_RULE,
-    "angle": ANGLE_RULE,
-    "duration": DURATION_RULE,
-}
 PLAN_KEYS = (
     "robot",
     "seed",
@@ -58,10 +48,9 @@ PLAN_KEYS = (
     "trace",
 )
 SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
-ORIENTATION_KEYS = ("start_orientation", "end_orientation")
 MAX_PLAN_SIZE = 1_000_000  # bytes
 MAX_RUNS = 10_000_000
-RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat", ".mcap")
+RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat", ".mcap", ".db3")
 SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
 COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
 CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
@@ -71,11 +60,6 @@ SETTLE_RULE = NumberRule(
     "the time that runs continue after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle
 )
 SERIES_RULE = NumberRule("the number of points kept of each motion", "", 0.0, 10_000.0, default=float(Compute.series))
-
-
-def file_relative_to_plan(table: CheckedTable, name: str | None) -> Path:
-    """The absolute path of a file that a plan names relative to itself."""
-    return (Path(table.file).parent / str(name)).absolute()
 
 
 def whole_number(table: CheckedTable, key: str, rule: NumberRule) -> int:
@@ -105,68 +89,6 @@ def flag(table: CheckedTable, key: str, default: bool) -> bool:
     return bool(value)
 
 
-def file_digest(file: Path) -> str:
-    """Digest of a file's content."""
-    return hashlib.sha256(read_bytes(file, PlanError)).hexdigest()[:16]
-
-
-def read_paths(table: CheckedTable, robot: Robot, inputs: tuple[Input, ...]) -> tuple[PathPlan, ...]:
-    """Read all paths of a plan; names must be unique."""
-    paths: list[PathPlan] = []
-    for number, path_table in enumerate(table.tables("path") if "path" in table.content else (), start=1):
-        path = _read_path(path_table, f"path {number}", robot)
-        if path.name in [each.name for each in paths]:
-            path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
-        start_varies = any(each.key.startswith("platform.start") for each in inputs)
-        if start_varies and (path.kind == "helix" or path.start is not None or path.start_orientation is not None):
-            path_table.refuse("", "has a start of its own, but platform.start varies", "leave start out of a line")
-        paths.append(path)
-    return tuple(paths)
-
-
-def _read_path(table: CheckedTable, default: str, robot: Robot) -> PathPlan:
-    hint = 'give the path a name of one line, as in name = "up"'
-    name = (table.text("name", hint) or "") if "name" in table.content else default
-    if not name.strip() or not name.isprintable():
-        table.refuse("name", f"is {format_value(name)}", hint)
-    kind_keys = [key for key in ("end", "radius", "recording") if key in table.content]
-    if len(kind_keys) != 1:
-        hint = "give end and duration (a line), centre, radius, rise, angle and duration (a helix), or recording"
-        table.refuse("", "is no path" if not kind_keys else f"has {' and '.join(kind_keys)}", hint)
-    if kind_keys == ["end"]:
-        table.require_known(("name", "start", "end", "duration", *ORIENTATION_KEYS))
-        start = table.point("start", "where the line starts") if "start" in table.content else None
-        end = table.point("end", "where the line ends")
-        line = PathPlan(name, "line", {"duration": table.number("duration", DURATION_RULE)}, start, end)
-        return _with_orientations(table, robot, line)
-    if kind_keys == ["radius"]:
-        table.require_known(("name", "centre", *HELIX_RULES, *ORIENTATION_KEYS))
-        numbers = {key: table.number(key, rule) for key, rule in HELIX_RULES.items()}
-        helix = PathPlan(name, "helix", numbers, table.point("centre", "the centre of the helix at its start"))
-        return _with_orientations(table, robot, helix)
-    table.require_known(("name", "recording", "until"))
-    file = file_relative_to_plan(table, table.text("recording", "name a recording with winch speeds"))
-    recording = read_recording(file, robot.cable_count, robot.recorded_columns)
-    duration, second_time = recording.duration, float(recording.time[1] - recording.time[0])
-    until = table.number("until", UNTIL_RULE) if "until" in table.content else duration
-    if until < second_time:
-        table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
-    return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
-
-
-def _with_orientations(table: CheckedTable, robot: Robot, path: PathPlan) -> PathPlan:
-    """The path with the orientations of its table, which only a platform that turns may have."""
-    orientations: dict[str, Quaternion] = {}
-    for key in (key for key in ORIENTATION_KEYS if key in table.content):
-        if not robot.platform.is_rigid_body:
-            hint = f"remove {key}, or give [platform] of the robot file an inertia"
-            table.refuse(key, "turns the platform, which is a point mass", hint)
-        w, x, y, z = table.unit_vector(key, "the unit quaternion [w, x, y, z]", Platform.start_orientation)
-        orientations[key] = (w, x, y, z)
-    start, end = (orientations.get(key) for key in ORIENTATION_KEYS)
-    return replace(path, start_orientation=start, end_orientation=end)
-
-
 def read_path_file(path: str | Path, robot: Robot) -> PathPlan:
     """Read a file of one path, a line or a helix: the keys of a plan's ``[[path]]``.
 
@@ -175,7 +97,7 @@ def read_path_file(path: str | Path, robot: Robot) -> PathPlan:
     table = _load_plan(Path(path))
     if "recording" in table.content:
         table.refuse("recording", "is no path of the platform", "give end and duration, or a helix")
-    return _read_path(table, "path", robot)
+    return read_path(table, "path", robot)
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -246,9 +168,15 @@ def _read_inputs(table: CheckedTable, identified: IdentifiedInputs) -> tuple[Inp
     """All inputs, those identified by a trace first."""
     vary = table.table("vary")
     inputs = identified.inputs + (read_parameter_space(vary, identified.content) if vary is not None else ())
-    for index, each in enumerate(inputs):
-        if each.key in {other.key for other in inputs[:index]}:
-            (vary or table).refuse(each.key, "varies twice", "let it vary once; [found] has the effects of its report")
+    keys_by_leaf: dict[tuple[str | int, ...], str] = {}
+    for each in inputs:
+        # A key path that leads nowhere is refused where its values are tried.
+        with suppress(KeyPathError):
+            leaves = leaves_of(identified.content, each.key)
+            for other in {keys_by_leaf[leaf] for leaf in leaves & keys_by_leaf.keys()}:
+                problem = "varies twice" if other == each.key else f"varies what {other} varies"
+                (vary or table).refuse(each.key, problem, "let it vary once; [found] has the effects of its report")
+            keys_by_leaf |= dict.fromkeys(leaves, each.key)
     return inputs
 
 
@@ -351,14 +279,19 @@ def _read_trace(table: CheckedTable) -> TracePlan:
     folder = file_relative_to_plan(trace, trace.text("recordings", 'name a folder, as in recordings = "season"'))
     if not folder.is_dir():
         trace.refuse("recordings", f"is {format_value(str(folder))}, no folder", "name a folder of recordings")
-    files = sorted(each for each in folder.iterdir() if each.suffix.lower() in RECORDING_SUFFIXES and each.is_file())
+    files = sorted(each for each in folder.iterdir() if _is_recording(each))
     if not files:
-        trace.refuse("recordings", f"has no recording in {folder}", f"put files there that end in {RECORDING_SUFFIXES}")
+        hint = f"put files there that end in {', '.join(RECORDING_SUFFIXES)}, or folders of bags"
+        trace.refuse("recordings", f"has no recording in {folder}", hint)
     return TracePlan(tuple(map(str, files)), tuple(map(file_digest, files)), trace.number("alpha", ALPHA_RULE))
 
 
+def _is_recording(path: Path) -> bool:
+    return is_bag(path) if path.is_dir() else path.suffix.lower() in RECORDING_SUFFIXES
+
+
 def _require_feasible(table: CheckedTable, plan: Plan, robot_file: Path) -> None:
-    """Refuse inputs that the robot file's rules reject, at the median of numbers and at each text."""
+    """Refuse inputs that the robot file's rules reject, at their medians, at ends that they have, and at each text."""
     if plan.paths and any(path.kind == "recording" for path in plan.paths) and plan.controllers != (OPEN_LOOP,):
         table.refuse("controllers", "cannot follow a recording, which is winch speeds", "remove controllers")
     if not (plan.paths or plan.compute.statics or plan.compute.modes):
@@ -369,7 +302,8 @@ def _require_feasible(table: CheckedTable, plan: Plan, robot_file: Path) -> None
     for varied in plan.inputs:
         where = f"{table.file}: vary.{varied.key}"
         try:
-            for value in varied.distribution.texts or (median_value(varied),):
+            values: tuple[float | str, ...] = (median_value(varied), *varied.distribution.ends)
+            for value in varied.distribution.texts or values:
                 robot_from_content(with_values(plan.content, {varied.key: value}), robot_file)
         except KeyPathError as problem:
             raise PlanError(where, problem.problem, problem.hint) from problem
