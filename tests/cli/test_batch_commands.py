@@ -29,6 +29,8 @@ LIMITED = """
 import resource, sys
 from tautwire.cli.application import run
 
+# Python would leave a module's bytecode cut off.
+sys.dont_write_bytecode = True
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 sys.exit(run(sys.argv[2:]))
 """
@@ -58,11 +60,11 @@ def users(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Users]:
 
 @pytest.mark.validate
 def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_path: Path) -> None:
-    file, out = plan_file(tmp_path, moving(8)), tmp_path / "out"
+    file, out = plan_file(tmp_path, moving(4)), tmp_path / "out"
     completed = users.campaign(file, out)
     assert completed.returncode == 0, completed.stderr
     assert completed.stdout.splitlines() == [
-        "16 runs, 16 of them now, 0 failed",
+        "8 runs, 8 of them now, 0 failed",
         *(str(out / name) for name in ("runs", "summary.json", "index.html")),
     ]
     page, rows = out / "index.html", out / "runs"
@@ -75,7 +77,7 @@ def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_
     assert parts and all(part["inputs"] == document["provenance"]["inputs"] for part in parts)
     assert document["provenance"]["inputs"][str(file)] in page.read_text(encoding="utf-8")
     again = users.campaign(file, out)
-    assert (again.returncode, again.stdout.splitlines()[0]) == (0, "16 runs, 0 of them now, 0 failed")
+    assert (again.returncode, again.stdout.splitlines()[0]) == (0, "8 runs, 0 of them now, 0 failed")
 
 
 @pytest.mark.validate
@@ -114,15 +116,12 @@ def test_fmus_reach_each_worker_once(users: Users, tmp_path: Path) -> None:
 
 @pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
-@pytest.mark.parametrize(("largest", "kept"), [(2_000, 0), (60_000, 8)], ids=["rows", "page"])
-def test_after_a_full_disk_the_same_command_gives_all_rows(
-    users: Users, tmp_path: Path, largest: int, kept: int
-) -> None:
-    file, out = plan_file(tmp_path, moving(4)), tmp_path / "out"
-    full = users.campaign(file, out, largest)
+def test_after_a_full_disk_the_same_command_gives_all_rows(users: Users, tmp_path: Path) -> None:
+    file, out = plan_file(tmp_path, moving(2)), tmp_path / "out"
+    full = users.campaign(file, out, largest=2_000)
     assert full.returncode == 1 and "File too large" in full.stderr and "Traceback" not in full.stderr
     assert not (out / "index.html").exists() and not list(out.rglob("*.partial"))
     again = users.campaign(file, out)
-    assert (again.returncode, again.stdout.splitlines()[0]) == (0, f"8 runs, {8 - kept} of them now, 0 failed")
+    assert (again.returncode, again.stdout.splitlines()[0]) == (0, "4 runs, 4 of them now, 0 failed")
     assert rows_of(out) == bare_rows(read_plan(file), tmp_path / "bare")
     assert (out / "index.html").exists() and (out / "summary.json").exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.static_pose import static_pose
-from tests.support.robots import EXAMPLES
+from tests.support.robots import EXAMPLES, example
 
 COGIRO, THREE = (str(EXAMPLES / name / "robot.toml") for name in ("cogiro", "three"))
 POSE = ["--at", "0.5,-0.4,2.2", "--orientation", "0.9999,0,0,0.01414"]
@@ -61,3 +63,11 @@ def test_what_is_wrong_is_one_line(capsys: pytest.CaptureFixture[str], arguments
 def test_a_pose_that_cannot_be_held_tells_the_cable(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["pose", COGIRO, "--at", "50,0,0"]) != 0
     assert "cannot be held at [50, 0, 0] m: no wrench closure" in capsys.readouterr().err
+
+
+def test_json_has_no_number_that_is_not_finite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Cables on all sides without a largest tension hold any wrench."""
+    robot = tmp_path / "robot.toml"
+    robot.write_text(robot_text(replace(example("eight"), tension=None)), encoding="utf-8")
+    assert run(["pose", str(robot), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail)["wrench_margin"] is None

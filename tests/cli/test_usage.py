@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
 
-from tautwire.cli import run
+from tautwire.cli import console, run
 from tests.support.robots import EXAMPLES
 
 ROBOT = str(EXAMPLES / "three" / "robot.toml")
@@ -33,6 +37,7 @@ EXAMPLES_OF = {
         ["linearise", ROBOT, "--out", "m.json", "--at", "1,2"],
         ["pose", ROBOT, "--rule", "fair"],
         ["pose", ROBOT, "--lengths", "1,2"],
+        ["pose", ROBOT, "--lengths", "30,30,30", "--rule", "least_norm"],
         ["workspace", ROBOT],
         ["workspace", ROBOT, "--out", "w.csv", "--lower", "here"],
         ["simulate", ROBOT, "--speeds", "s.csv", "--out", "r.csv", "--step", "0"],
@@ -42,6 +47,7 @@ EXAMPLES_OF = {
         ["new", "hall", "--cables", "99"],
         ["material", "--out", "m", "--coverage", "0"],
         ["campaign"],
+        ["campaign", "plan.toml", "--out", "rows", "--scheduler", "tcp://localhost:8786", "--workers", "2"],
         ["paper", "--step", "1"],
         ["build"],
         ["build", ROBOT, "--outt", "build"],
@@ -79,3 +85,41 @@ def test_linearise_prints_the_model_as_json_and_writes_nothing(
     assert reported == {**model, "report": "modes.html"}
     assert provenance[0]["inputs"] == provenance[1]["inputs"]
     assert [path.name for path in tmp_path.iterdir()] == ["modes.html"]
+
+
+class Truncated:
+    """An importer of a module whose compiled file ends too early."""
+
+    def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
+        if name == "tautwire.robot.static_pose":
+            raise EOFError("marshal data too short")
+        return None
+
+
+def test_a_damaged_installation_is_no_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "tautwire.robot.static_pose", raising=False)
+    monkeypatch.setattr(sys, "meta_path", [Truncated(), *sys.meta_path])
+    with pytest.raises(EOFError, match="marshal data too short"):
+        run(["pose", ROBOT])
+
+
+def test_a_name_that_standard_output_cannot_encode_is_printed_escaped(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,\u03bcwinch_speed_1,x\n0,1,2\n0.1,1,2\n0.2,1,2\n", encoding="utf-8")
+    result = subprocess.run(
+        [sys.executable, "-m", "tautwire.cli", "columns", str(log), "--cables", "1"],
+        env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"},
+        capture_output=True,
+        check=False,
+    )
+    assert result.returncode == 0, result.stderr
+    assert rb"\u03bcwinch_speed_1" in result.stdout
+
+
+def test_a_page_links_to_a_file_on_another_drive_by_its_uri(monkeypatch: pytest.MonkeyPatch) -> None:
+    def on_another_drive(path: object, start: object) -> str:
+        raise ValueError("path is on mount 'C:', start on mount 'D:'")
+
+    monkeypatch.setattr(console.os.path, "relpath", on_another_drive)
+    links = console.relative_links(Path("/reports/check.html"), Path("/lab/fit.csv"))
+    assert links == {"fit.csv": "file:///lab/fit.csv"}

@@ -15,7 +15,7 @@ from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.reports.downsampling import unpack_float32
 from tautwire.reports.run_overview import RunOverview
 from tautwire.reports.run_page import run_page
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.rigid_robots import suspended_robot
 from tests.support.rigid_runs import made_rigid_run
@@ -100,6 +100,12 @@ def test_slack_cables_and_failures_are_named_at_the_top() -> None:
     row[list(run.columns).index("tension_2")] = 0.0
     run.overview.add(21.0, row)
     assert "Slack at times: cable 2" in Page(run_page(run, {})).text
+    # A rope that slackens softly carries 69 N where nothing pulls at it.
+    soft, run_of_soft = EffectSetting("slack", {"softness": 100.0}, (2,)), made_run(samples=200)
+    run_of_soft.overview.add(22.0, np.where(np.array(run.columns) == "tension_2", 69.0, row))
+    assert "Slack at times: cable 2" not in Page(run_page(run_of_soft, {})).text
+    run_of_soft = replace(run_of_soft, robot=run.robot.with_effect(soft))
+    assert "Slack at times: cable 2" in Page(run_page(run_of_soft, {})).text
     failed = replace(run, statistics=None, failure="cable_1: doStep failed at 21 s")
     page = Page(run_page(failed, {}))
     assert "Stopped: an FMU failed" in page.text and "cable_1: doStep failed at 21 s" in page.text
@@ -125,7 +131,7 @@ def test_page_asks_nothing_of_the_network() -> None:
 
 def test_hostile_names_do_nothing() -> None:
     run = replace(made_run(HOSTILE, 200), notes=(HOSTILE,), failure=HOSTILE)
-    hostile = Page(run_page(replace(run, recording=replace(run.recording, unknown_columns=(HOSTILE,))), {}))
+    hostile = Page(run_page(run, {}))
     assert "img" not in [tag for tag, _ in hostile.elements]
     assert len(hostile.scripts) == 3 and hostile.open == []
     assert hostile.text.count("onerror") >= 3
@@ -155,11 +161,12 @@ def test_columns_are_those_of_a_result_file() -> None:
 def test_a_run_that_fails_leaves_a_page_that_says_where(tmp_path: Path) -> None:
     recording, page = tmp_path / "torn.csv", tmp_path / "run.html"
     speeds = {"time": [0.0, 0.1, 0.2, 0.3]} | {f"winch_speed_{i}": [0.0, 0.0, 0.0, 1e6] for i in (1, 2, 3)}
-    pd.DataFrame(speeds).to_csv(recording, index=False)
+    pd.DataFrame({**speeds, "motor current": 1.0}).to_csv(recording, index=False)
     arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
     assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 1
     result = Page(page.read_text(encoding="utf-8"))
     assert "Stopped: an FMU failed" in result.text and "the run up to then is in" in result.text
+    assert "not read: motor current" in result.text
     assert unpack_float32(result.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
 
 
@@ -203,9 +210,11 @@ def test_page_of_a_rigid_platform_on_many_cables_stays_small(robot: Robot) -> No
     assert len(unpack_float32(scene["time"])) >= 250
 
 
-def test_a_tracker_slower_than_the_log_is_drawn_as_lines() -> None:
-    run = made_run(samples=401)
-    slow = np.where(np.arange(401)[:, None] % 4, np.nan, run.recording.position)
+@pytest.mark.parametrize("samples", [401, 4001])
+def test_a_tracker_slower_than_the_log_is_drawn_as_lines(samples: int) -> None:
+    """Of a long run only each second row is kept, or fewer: those without a sample of the tracker."""
+    run = made_run(samples=samples)
+    slow = np.where(np.arange(samples)[:, None] % 4 != 1, np.nan, run.recording.position)
     choice = Page(run_page(replace(run, recording=replace(run.recording, position=slow)), {})).data()["choices"][0]
     (recorded, *_), channel = choice["scene"]["paths"], choice["channels"][0]
     assert recorded["name"] == "recorded"

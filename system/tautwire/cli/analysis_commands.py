@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError, UnreachableError
+from ..json_document import json_value
 from ..provenance import Provenance
 from ..robot.robot_file_reader import read_robot
 from ..robot.schema import Robot
@@ -107,7 +108,7 @@ def _write_model(
     with ExitStack() as stack:
         if out is not None:
             scratch = stack.enter_context(atomic_file(out))
-            scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
+            scratch.write_text(json.dumps(json_value(document), indent=1, allow_nan=False), encoding="utf-8")
         if report is not None and page is not None:
             stack.enter_context(atomic_file(report)).write_text(page, encoding="utf-8")
     return ({"model": out} if out else {}) | ({"report": report} if report else {})

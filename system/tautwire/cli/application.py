@@ -6,6 +6,7 @@ import inspect
 import sys
 import tempfile
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
@@ -95,6 +96,9 @@ def _options(
 def main() -> None:
     """Runs the command line; the exit status is 0 for success, 2 for invalid input, 1 for any other failure."""
     open_closed_streams()
+    # Names of files and columns may hold characters that standard output's encoding lacks.
+    if isinstance(sys.stdout, TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     raise_interrupt_on_termination()
     sys.exit(run(sys.argv[1:]))
 
@@ -119,7 +123,12 @@ def run(arguments: list[str]) -> int:
         )
     except MemoryError:
         return _report_error("not enough memory: give a shorter recording, or free memory", EXIT_FAILURE)
-    except (KeyboardInterrupt, typer.Abort):
+    except typer.Abort as abort:
+        # typer makes one of any EOFError, as of a damaged .pyc file, which is no interrupt.
+        if isinstance(abort.__cause__, EOFError):
+            raise abort.__cause__ from None
+        status = EXIT_FAILURE
+    except KeyboardInterrupt:
         status = EXIT_FAILURE
     if status == EXIT_WRONG_INPUT:
         return EXIT_WRONG_INPUT

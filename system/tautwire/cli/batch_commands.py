@@ -45,6 +45,8 @@ def campaign(
     from ..estimation import processors
 
     output = CommandOutput(as_json, quiet)
+    if scheduler is not None and workers is not None:
+        raise InputError("--workers", "is given with --scheduler, which has workers of its own", "omit one of them")
     plan = read_plan(plan_file)
     for note in plan.notes:
         output.note(note)

@@ -25,6 +25,7 @@ from rich.progress import (
 )
 
 from ..errors import InputError, UnreachableError
+from ..json_document import json_value
 from ..provenance import Provenance, provenance_of
 from ..robot.robot_file_reader import read_columns_file, read_robot, read_tracker_file
 from ..robot.schema import Robot, UserFmu
@@ -51,7 +52,7 @@ class CommandOutput:
     def result(self, lines: Iterable[object], document: Mapping[str, object]) -> None:
         """Prints the result, as lines or as one JSON object."""
         if self.as_json:
-            print(json.dumps(document, default=str))
+            print(json.dumps(json_value(document), default=str, allow_nan=False))
         elif not self.quiet:
             for line in lines:
                 print(line)
@@ -140,9 +141,16 @@ def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> 
 
 
 def relative_links(page: Path, *files: Path) -> dict[str, str]:
-    """Relative paths from a page to files, by file name."""
-    folder = page.absolute().parent
-    return {file.name: Path(os.path.relpath(file.absolute(), folder)).as_posix() for file in files}
+    """Relative paths from a page to files, by file name; URIs of files on other Windows drives."""
+    return {file.name: _link(file.absolute(), page.absolute().parent) for file in files}
+
+
+def _link(file: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    # On Windows no relative path leads to another drive.
+    except ValueError:
+        return file.as_uri()
 
 
 def parse_position(text: str, option: str = "--at") -> tuple[float, float, float]:

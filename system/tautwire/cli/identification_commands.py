@@ -195,7 +195,7 @@ def trace(
         raise InputError("--check-tracker", "is given without --check", "name the winches' log of the same motion")
     limit = TimeLimit(time_limit)
     output = CommandOutput(as_json, quiet)
-    if is_material_table(fit):
+    if columns is None and tracker is None and is_material_table(fit):
         if check is not None:
             raise InputError("--check", f"{fit} is a dynamic test of a rope", "omit it: its rows are cross-validated")
         judge_rope_material(context, fit, robot_file, out, alpha, output)

@@ -34,8 +34,9 @@ def pose(
         str | None, typer.Option(metavar="W,X,Y,Z", help="Orientation of the platform; by default that of the file.")
     ] = None,
     rule: Annotated[
-        str, typer.Option(help="Tension distribution: nearest, least_norm, barycentre or closed_form.")
-    ] = "nearest",
+        str | None,
+        typer.Option(help="Tension distribution: nearest (the default), least_norm, barycentre or closed_form."),
+    ] = None,
     lengths: Annotated[
         str | None, typer.Option(metavar="L1,L2,...", help="Rope lengths, m: all poses near that one that have them.")
     ] = None,
@@ -52,13 +53,16 @@ def pose(
     from ..robot.static_pose import static_pose
     from ..robot.tension_distribution import RULES
 
-    if rule not in RULES:
+    if rule is not None and rule not in RULES:
         raise InputError("--rule", f"{rule!r} is no rule", f"give one of {', '.join(RULES)}")
+    if rule is not None and lengths is not None:
+        raise InputError("--rule", "is given with --lengths, which lead to poses without it", "omit one of them")
     output, robot = CommandOutput(as_json, quiet), read_robot(robot_file)
     position = None if at is None else parse_position(at)
     quaternion = None if orientation is None else parse_quaternion(orientation)
     provenance = {"provenance": command_provenance(context, robot_file).document()}
     if lengths is None:
+        rule = rule or "nearest"
         held = static_pose(robot, position, quaternion, rule)
         output.result(_pose_lines(robot, held), {**_pose_document(held), "rule": rule, **provenance})
         return

@@ -117,7 +117,9 @@ def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tu
     """The recorded values of an output, None where there are none, and their difference from the overview's rows."""
     if recorded is None or not np.isfinite(recorded).any():
         return None, np.zeros(0)
-    thinned_recording, rows = recorded[:: run.overview.group_size], run.overview.rows[:, column_index]
+    # A sensor slower than the log may have no sample in the rows that are left.
+    bridged = bridge_short_gaps(run.recording.time, recorded)
+    thinned_recording, rows = bridged[:: run.overview.group_size], run.overview.rows[:, column_index]
     count = min(len(thinned_recording), len(rows))
     return recorded, thinned_recording[:count] - rows[:count]
 
@@ -179,7 +181,8 @@ def _run_scene(run: ReportedRun) -> RobotScene:
     platform = path[row_indices]
     paths = [ScenePath("co-simulated", platform, "accent", 5)]
     if recording.has_position:
-        measured = measured_path(overview.time, recording.position[recorded_rows], path)[row_indices]
+        bridged = bridge_short_gaps(recording.time, recording.position)
+        measured = measured_path(overview.time, bridged[recorded_rows], path)[row_indices]
         paths.insert(0, ScenePath("recorded", measured, "before", 2, "dot"))
         magnification = deviation_magnification(np.array(robot.anchors), platform, [measured - platform])
     return RobotScene(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..cosimulation import Recorder, RunStatistics
 from ..recordings.recording import Recording
+from ..robot.active_effects import slack_tensions
 from ..robot.schema import Robot
 
 Array = NDArray[np.float64]
@@ -148,7 +149,8 @@ class ReportedRun:
         }
 
     def slack_cables(self) -> list[str]:
-        """Cables, counted from 1, whose tension reached zero."""
+        """Cables, counted from 1, whose tension reached that of a cable at which nothing pulls."""
         low, _ = self.overview.extremes()
         tensions = self.column_indices("tension_", self.robot.cable_numbers)
-        return [cable for index, cable in tensions.items() if low[index] <= 0.0]
+        slack = slack_tensions(self.robot)
+        return [cable for index, cable in tensions.items() if low[index] <= slack[int(cable) - 1]]

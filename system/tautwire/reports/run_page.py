@@ -49,12 +49,10 @@ def run_page(run: ReportedRun, links: Mapping[str, str], provenance: Provenance 
     lines, headline = output_series(run), _run_sentence(run)
     title, subject = f"{run.robot.name}: {headline}", f"{run.robot.name}, {run.robot.cable_count} cables"
     header = PageHeader("Tautwire run", subject, headline, title, *_verdict(run), links, provenance)
-    unread = ", ".join(run.recording.unknown_columns)
-    notes = [*run.notes, *([f"Columns of the recording that were not read: {unread}"] if unread else [])]
     statistics = None if run.statistics is None else _statistics_texts(run.statistics)
     quantities = _quantities(run, lines)
     return render_page(
-        "run", header, run_data(run, lines), run=run, statistics=statistics, quantities=quantities, notes=notes
+        "run", header, run_data(run, lines), run=run, statistics=statistics, quantities=quantities, notes=run.notes
     )
 
 
@@ -156,12 +154,10 @@ def atomic_run_page(
                 raise
             failure = error
         if scratch is not None and target is not None:
-            statistics, notes = outcomes[0] if outcomes else (None, ())
+            recording = read_recording(recording_file, robot.cable_count, robot.recorded_columns)
+            statistics, notes = outcomes[0] if outcomes else (None, recording.notes)
             names = tuple(column.name for column in columns[1:])
-            recording, failure_text = (
-                read_recording(recording_file, robot.cable_count, robot.recorded_columns),
-                None if failure is None else str(failure),
-            )
+            failure_text = None if failure is None else str(failure)
             run = ReportedRun(robot, names, overview, recording, statistics, tuple(notes), failure_text)
             scratch.write_text(run_page(run, target.links, target.provenance), encoding="utf-8")
     if failure is not None:
