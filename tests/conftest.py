@@ -17,11 +17,23 @@ if TYPE_CHECKING:
 
 # Modules by the time they take, so that none is left to one worker at the end.
 SLOWEST_FIRST = (
-    "inexact_forms",
+    "paper_reproduction",
+    "importers",
+    "ringdown_damping",
+    "readme",
+    "rigid_trace",
+    "input_design",
     "unexplained_residual",
     "trace_beside_disturbance",
     "wheel",
     "planar_robots",
+    "sensor_offsets",
+    "preprocessing",
+    "confusable_models",
+    "mistaken_motion",
+    "laboratory_files",
+    "hostile_files",
+    "inexact_forms",
     "stepwise_selection",
     "uncertain_parameters",
     "effects_in_fmus",
@@ -29,16 +41,17 @@ SLOWEST_FIRST = (
     "dask_cluster",
     "winch_robot",
     "identification",
-    "paper_reproduction",
-    "importers",
     "suggested_commands",
     "robot_cosimulation",
     "interrupted_commands",
     "black_box",
     "component_localisation",
-    "shared_recordings",
+    "rigid_control",
+    "rigid_effects",
+    "laboratory_folder",
+    "material_command",
+    "shipped_recordings",
     "isolation",
-    "readme",
     "formula_discovery",
     "time_limit",
     "clock_offsets",
@@ -48,21 +61,25 @@ SLOWEST_FIRST = (
     "lost_fmus",
     "overdue_interrupt",
     "campaign_run",
-    "input_design",
     "profile_likelihood",
-    "preprocessing",
     "initial_motion",
     "winch_slave",
     "user_fmus",
-    "hostile_files",
     "batch_commands",
     "c_hosts",
 )
 
 
 def pytest_configure() -> None:
-    """Keep machine code in build/, not among the user's files."""
+    """Keep machine code in build/, not among the user's files, and each of several test processes on one processor.
+
+    Traces then start no processes of their own, which would wait for those of the other tests.
+    """
     os.environ["TAUTWIRE_CACHE"] = str(Path(__file__).resolve().parent.parent / "build" / "cache")
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker and hasattr(os, "sched_setaffinity"):
+        processors = sorted(os.sched_getaffinity(0))
+        os.sched_setaffinity(0, {processors[int(worker.removeprefix("gw")) % len(processors)]})
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -105,6 +122,18 @@ def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 def crane_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """A rigid platform on eight cables."""
     return fmus_built_once(crane_robot(), "crane", tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def native_crane_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The same as machine code, for long runs."""
+    return fmus_built_once(crane_robot(), "native-crane", tmp_path_factory, native=True)
+
+
+@pytest.fixture(scope="session")
+def native_winch_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The robot on winches with limits as machine code, for long runs."""
+    return fmus_built_once(with_winch(paper_robot(), LIMITED), "native-winch", tmp_path_factory, native=True)
 
 
 @pytest.fixture(scope="module")

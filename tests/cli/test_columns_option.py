@@ -68,3 +68,14 @@ def test_columns_that_would_not_be_read_are_refused(tmp_path: Path, capsys: pyte
     own.write_text(TABLE, encoding="utf-8")
     assert run(["check", str(THREE / "robot.toml"), "--columns", str(own)]) == 2
     assert "--columns: is given without a recording" in capsys.readouterr().err
+
+
+def test_a_log_with_a_column_of_frequencies_is_no_test_of_a_rope(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, log = tmp_path / "columns.toml", tmp_path / "log.csv"
+    own.write_text(TABLE, encoding="utf-8")
+    log.write_text("t_ms,frequency,Drive1,Drive2,Drive3\n0,50,0.1,fast,0.1\n20,50,0.1,0.1,0.1\n", encoding="utf-8")
+    arguments = ["trace", str(THREE / "robot.toml"), str(log), "--columns", str(own), "--out", str(tmp_path / "report")]
+    assert run(arguments) == 2
+    assert f"{log}: line 2, column winch_speed_2: is 'fast'" in capsys.readouterr().err

@@ -37,7 +37,7 @@ TABLE_TEXT = "\n".join(
     line for line in PAPER_TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")
 )
 ONE_LINE = 4000
-EXAMPLES_OF_ROBOTS, EXAMPLES_OF_RECORDINGS, EXAMPLES_OF_TABLES = 250, 100, 60
+EXAMPLES_OF_ROBOTS, EXAMPLES_OF_RECORDINGS, EXAMPLES_OF_TABLES = 60, 30, 20
 
 HOSTILE = settings(
     deadline=None,

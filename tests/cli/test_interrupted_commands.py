@@ -23,6 +23,13 @@ from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
 ROBOT, FIT = str(THREE / "robot.toml"), str(THREE / "fit.csv")
+# A trace has its worker processes at once, though tests are kept on one processor.
+ON_TWO_PROCESSORS = """
+import tautwire.estimation
+from tautwire.cli import main
+tautwire.estimation.processors = lambda: 2
+main()
+"""
 COMMAND = [sys.executable, "-m", "tautwire.cli"]
 LONG = ["simulate", ROBOT, "--speeds", FIT, "--step", "1e-4"]
 QUICK = ["workspace", ROBOT, "--spacing", "40"]
@@ -73,7 +80,7 @@ def begun(folder: Path, arguments: list[str], out: Path) -> Iterator[subprocess.
     scratch = folder / "scratch"
     scratch.mkdir()
     process = subprocess.Popen(
-        [*COMMAND, *arguments, "--out", str(out)],
+        [sys.executable, "-c", ON_TWO_PROCESSORS, *arguments, "--out", str(out)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(scratch)},
@@ -178,6 +185,8 @@ import json, resource, sys
 import matplotlib.font_manager  # it has files of its own
 from tautwire.cli.application import run
 
+# Python would leave a module's bytecode cut off.
+sys.dont_write_bytecode = True
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 print(json.dumps([run(arguments) for arguments in json.loads(sys.argv[2])]))
 """

@@ -34,18 +34,14 @@ def call_for_ever(self, count, *arguments):
     self._native_run(0, 2**62, pointers, (ctypes.c_int64 * 50)())
 
 if __name__ == "__main__":
-    tautwire.estimation.processors = lambda: int(os.environ["PROCESSES"])
+    tautwire.estimation.processors = lambda: 1
     CompiledFunction.__call__ = call_for_ever
     from tautwire.cli import main
     main()
 """
 
 
-@pytest.mark.validate(but=["2-1"])
-@pytest.mark.parametrize(("number", "processes"), [(signal.SIGINT, 1), (signal.SIGTERM, 2)])
-def test_an_interrupt_ends_a_trace_inside_a_compiled_call(
-    tmp_path: Path, number: signal.Signals, processes: int
-) -> None:
+def test_an_interrupt_ends_a_trace_inside_a_compiled_call(tmp_path: Path) -> None:
     (tmp_path / "scratch").mkdir()
     (tmp_path / "endless.py").write_text(TRACE_WITH_AN_ENDLESS_CALL)
     process = subprocess.Popen(
@@ -53,15 +49,14 @@ def test_an_interrupt_ends_a_trace_inside_a_compiled_call(
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env={**os.environ, "TMPDIR": str(tmp_path / "scratch"), "PROCESSES": str(processes)},
+        env={**os.environ, "TMPDIR": str(tmp_path / "scratch")},
         text=True,
     )
     try:
         assert until((tmp_path / "inside").exists)
-        assert processes == 1 or until(lambda: len(descendants(process.pid)) >= processes)
         others = descendants(process.pid)
         sent_at = time.monotonic()
-        process.send_signal(number)
+        process.send_signal(signal.SIGINT)
         stdout, stderr = process.communicate(timeout=60)
         assert time.monotonic() - sent_at < MAX_SECONDS
     finally:

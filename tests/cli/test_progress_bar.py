@@ -32,12 +32,12 @@ AT_WORK = {
         [ROBOT, "--effects", "damping,payload", "--programs", "2", "--duration", "1", "--out", "out.csv"],
         "trying programs",
     ),
-    "material": (["--out", "out"], "fitting"),
 }
-# These take minutes: what does the work is taken from them, after its first word.
+# These take long: what does the work is taken from them, after its first word.
 LONG = {
     "trace": ([ROBOT, FIT, "--out", "out"], "tautwire.estimation.trace"),
     "campaign": (["plan.toml", "--out", "out"], "tautwire.campaigns.campaign_runner.run_campaign"),
+    "material": (["--out", "out"], "tautwire.materials.trace_material"),
     "paper": (["--out", "out"], "tautwire.paper.write_paper"),
 }
 # They only read or write a text, or compute one pose.

@@ -80,7 +80,7 @@ CASES = (
     Case("sensor_delay", {"seconds": 0.05, "outputs": "position"}, {"position_delay": 0.05}),
     Case("sensor_delay", {"seconds": 0.05, "form": "lag"}, {"tension_time_constant": 0.05}),
 )
-# What a trace may discover: the rig has them in forms of its own, for which they stand.
+# Those on no list; the rig has frames and swinging loads in other forms, and knows `stiffening` by another name.
 UNLISTED_CASES = (
     same("frame", compliance=3e-7),
     same("hanging_load", weight=200.0),
