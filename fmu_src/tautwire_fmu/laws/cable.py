@@ -138,8 +138,15 @@ def fold_constant_effects(
     Any other cable is returned as it is."""
     if not effects or not all(active.effect.only_sets_constants for active in effects):
         return cable, effects
-    modulus, _ = stages.stiffness(m, effects, [()] * len(effects), cable)
-    return cable._replace(modulus=modulus, damping=stages.viscosity(m, effects, cable)), ()
+    return _with_effective_constants(m, cable, effects, [()] * len(effects)), ()
+
+
+def _with_effective_constants(
+    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], states: Sequence[Tuple[Any, ...]]
+) -> CableConstants:
+    """The cable with the modulus and damping that effects give it."""
+    modulus, _ = stages.stiffness(m, effects, states, cable)
+    return cable._replace(modulus=modulus, damping=stages.viscosity(m, effects, cable))
 
 
 def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> CableState:
@@ -274,9 +281,9 @@ def _span_tension(
     if not effects:
         pull = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
         return pull, m.maximum(pull, 0.0)
-    damping = stages.viscosity(m, effects, cable)
-    pull = motion.elastic_tension + cable.area * (damping * motion.strain_rate)
-    pull = pull + stages.added_tension(m, effects, state.effects, cable, motion)
+    effective = _with_effective_constants(m, cable, effects, state.effects)
+    pull = motion.elastic_tension + cable.area * (effective.damping * motion.strain_rate)
+    pull = pull + stages.added_tension(m, effects, state.effects, effective, motion)
     return pull, stages.carried_tension(m, effects, cable, pull)
 
 

@@ -30,6 +30,25 @@ def test_rope_and_frame_share_a_stretch_as_springs_in_series() -> None:
     assert shown.tension - 500.0 == pytest.approx(0.01 / (1.0 / rope + COMPLIANCE), rel=1e-12)
 
 
+@pytest.mark.parametrize("damping", [0.0, 2e8])
+def test_a_rope_of_another_modulus_and_damping_shares_its_own_tension(damping: float) -> None:
+    cable = CableConstants(LINEAR, (0.0, 0.0, 10.0), 1e11, 1e-5, 0.0, 10.0, 500.0, (0.0, 0.0, 1.0), 9.81)
+    inputs = CableInputs((0.0, 0.0, -0.01), (0.0, 0.0, -0.05), 0.0)
+
+    def tension(cable: CableConstants, **values: dict[str, float]) -> float:
+        effects = tuple(ActiveEffect(BY_NAME[name], BY_NAME[name].values(**own)) for name, own in values.items())
+        state = CableState(10.0, 0.0, ((),) * len(effects))
+        line = span(REAL, cable, inputs, effects)
+        return float(
+            cable_outputs(REAL, cable, effects, state, cable_motion(REAL, cable, effects, state, line, 0.0)).tension
+        )
+
+    frame = {"compliance": COMPLIANCE}
+    by_effects = tension(cable, modulus={"modulus": 1.5e11}, damping={"damping": damping}, frame=frame)
+    declared = tension(cable._replace(modulus=1.5e11, damping=damping), frame=frame)
+    assert by_effects == pytest.approx(declared, rel=1e-12)
+
+
 def test_it_is_no_kind_of_the_list() -> None:
     assert FRAME in UNLISTED
     assert FRAME not in ALL

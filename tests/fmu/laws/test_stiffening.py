@@ -41,6 +41,18 @@ def test_the_tangent_modulus_grows_with_the_strain_from_no_tension(stretch: floa
     assert tangent_modulus == pytest.approx(MODULUS * (1.0 + 2.0 * QUADRATIC * total_strain), rel=1e-9)
 
 
+def test_a_rope_of_another_modulus_stiffens_from_that() -> None:
+    values = {"modulus": {"modulus": 2.0 * MODULUS}, "stiffening": {"quadratic": QUADRATIC}}
+    effects = tuple(ActiveEffect(BY_NAME[name], BY_NAME[name].values(**own)) for name, own in values.items())
+    cable = CableConstants(LINEAR, (0.0, 0.0, LENGTH), MODULUS, AREA, 0.0, LENGTH, TENSION, (0.0, 0.0, 1.0), 9.81)
+    line = span(REAL, cable, CableInputs((0.0, 0.0, -0.01), (0.0, 0.0, 0.0), 0.0), effects)
+    state = CableState(LENGTH, 0.0, ((), ()))
+    motion = cable_motion(REAL, cable, effects, state, line, 0.0)
+    start, strain = TENSION / (2.0 * MODULUS * AREA), TENSION / (2.0 * MODULUS * AREA) + motion.strain
+    expected = TENSION + 2.0 * MODULUS * AREA * (strain + QUADRATIC * strain**2 - start - QUADRATIC * start**2)
+    assert cable_outputs(REAL, cable, effects, state, motion).tension == pytest.approx(expected, rel=1e-12)
+
+
 def test_it_is_no_effect_of_the_list() -> None:
     assert STIFFENING in UNLISTED
     assert STIFFENING not in ALL
