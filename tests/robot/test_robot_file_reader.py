@@ -207,6 +207,12 @@ def test_refuses_a_wrong_value(tmp_path: Path, old: str, new: str, key: str, wor
             "effect.payload[2]",
             ["twice", "effect.payload[1]"],
         ),
+        (
+            "[[effect.sensor_offset]]\nposition_offset_x = 0.01\ncables = [1]\n"
+            "[[effect.sensor_offset]]\ntension_offset = 5.0\nposition_offset_z = 0.02\ncables = [2]",
+            "effect.sensor_offset[2]",
+            ["twice for the tracker", "effect.sensor_offset[1]"],
+        ),
     ],
 )
 def test_refuses_a_wrong_effect(tmp_path: Path, effect: str, key: str, words: list[str]) -> None:

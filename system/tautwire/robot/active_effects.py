@@ -59,12 +59,12 @@ def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:
 def platform_fmu_settings(robot: Robot) -> tuple[EffectSetting, ...]:
     """Those of :func:`platform_settings`, each effect once: load cells may have several of one, positions have not."""
     settings = platform_settings(robot)
-    acting = [s for s in settings if not s.cables or _shifts_position(s)]
+    acting = [s for s in settings if not s.cables or shifts_position(s)]
     idle = {s.name: s for s in reversed(settings) if s.name not in [each.name for each in acting]}
     return tuple(s for s in settings if s in acting or s is idle.get(s.name))
 
 
-def _shifts_position(setting: EffectSetting) -> bool:
+def shifts_position(setting: EffectSetting) -> bool:
     """Whether a sensor effect changes the measured position, and not load cells alone."""
     effects = (active_effect(setting),)
     stage_results = (f(REAL, effects)[1] for f in (stages.sensor_gains, stages.sensor_offsets, stages.sensor_delays))

@@ -13,6 +13,7 @@ from tautwire_fmu.laws.mathematics import REAL
 from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
+from .active_effects import shifts_position
 from .checked_table import CheckedTable
 from .platform_reader import refuse_keys_of_rigid_bodies
 from .schema import AXES, PER_CABLE_COMPONENTS, EffectSetting, Formula, Point
@@ -31,6 +32,7 @@ def read_effects(table: CheckedTable, cable_count: int, is_rigid: bool) -> tuple
             table.refuse(name, "is not a known effect", f"write {suggest_name(name, BY_NAME)}, or remove it")
             continue
         tables_by_cable: dict[int, str] = {}
+        of_tracker = ""
         for effect_table in table.table_or_tables(name):
             setting = _read_effect(effect_table, BY_NAME[name], cable_count)
             if not (is_rigid or BY_NAME[name].needs_rigid_body):
@@ -43,6 +45,10 @@ def read_effects(table: CheckedTable, cable_count: int, is_rigid: bool) -> tuple
                     problem = f"is set twice for {which}, in {tables_by_cable[cable]} too"
                     effect_table.refuse("cables" if cable else "", problem, "set it once")
                 tables_by_cable[cable] = effect_table.key
+            if shifts_position(setting):
+                if of_tracker:
+                    effect_table.refuse("", f"is set twice for the tracker, in {of_tracker} too", "set it once")
+                of_tracker = effect_table.key
             settings.append(setting)
     return tuple(settings)
 
