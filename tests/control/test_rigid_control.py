@@ -40,6 +40,7 @@ from tautwire.control import (
 from tautwire.control.closed_loop import controller_wires
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.errors import ArgumentError, InputError
+from tautwire.fmus.fmu_slots import SlotError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import linearise
 from tautwire.robot.pose_trajectory import PoseTrajectory, slerp
@@ -140,8 +141,8 @@ def test_the_closed_loop_follows_a_pose_path_under_noise(native_crane_fmus: Robo
     assert noisy.tension.min() > 0.9 * path_tensions(robot, path, noisy.time).min()
 
 
-def without_output(fmus: RobotFmus, name: str, folder: Path) -> RobotFmus:
-    """The FMUs with a platform of the user that has the outputs of a vector by another name."""
+def without_vector(fmus: RobotFmus, name: str, folder: Path) -> RobotFmus:
+    """The FMUs with a platform of the user that has a vector by another name."""
     platform = folder / "platform.fmu"
     with zipfile.ZipFile(fmus.platform) as whole, zipfile.ZipFile(platform, "w") as changed:
         for item in whole.namelist():
@@ -156,7 +157,7 @@ def test_what_the_controller_measures_does_not_depend_on_other_outputs(
 ) -> None:
     robot, path = crane_robot(), turning_path(crane_robot())
     whole = cosimulate_closed_loop(native_crane_fmus, robot, lqg, path, 0.3)
-    without_rates = without_output(native_crane_fmus, "angular_velocity", tmp_path)
+    without_rates = without_vector(native_crane_fmus, "angular_velocity", tmp_path)
     motion = cosimulate_closed_loop(without_rates, robot, lqg, path, 0.3)
     assert motion.missing_columns == ("wx", "wy", "wz")
     assert motion.position == pytest.approx(whole.position, abs=1e-12)
@@ -167,11 +168,26 @@ def test_a_platform_that_does_not_show_its_orientation_is_refused(
     native_crane_fmus: RobotFmus, lqg: Controller, tmp_path: Path
 ) -> None:
     robot, path = crane_robot(), turning_path(crane_robot())
-    blind = without_output(native_crane_fmus, "orientation", tmp_path)
+    blind = without_vector(native_crane_fmus, "orientation", tmp_path)
     with pytest.raises(InputError, match="the controller needs qw, qx, qy, qz, which no FMU outputs"):
         cosimulate_closed_loop(blind, robot, lqg, path, 0.3)
     with pytest.raises(InputError, match="the controller needs qw, qx, qy, qz, which no FMU outputs"):
         controller_wires(blind)
+
+
+def test_a_load_on_a_platform_without_an_input_for_it_is_refused(
+    native_crane_fmus: RobotFmus, lqg: Controller, tmp_path: Path
+) -> None:
+    robot, path = crane_robot(), turning_path(crane_robot())
+    options = ClosedLoopOptions(external_force=np.tile([40.0, 0.0, -60.0], (31, 1)))
+    (tmp_path / "held").mkdir()
+    deaf = without_vector(native_crane_fmus, "external_force", tmp_path)
+    with pytest.raises(SlotError, match=r"external_force\.x, external_force\.y, external_force\.z is no input"):
+        cosimulate_closed_loop(deaf, robot, lqg, path, 0.3, options)
+    whole = cosimulate_closed_loop(native_crane_fmus, robot, lqg, path, 0.3, options)
+    without_rates = without_vector(native_crane_fmus, "external_force_rate", tmp_path / "held")
+    held = cosimulate_closed_loop(without_rates, robot, lqg, path, 0.3, options)
+    assert held.position == pytest.approx(whole.position, abs=1e-12)
 
 
 @pytest.mark.validate

@@ -23,14 +23,13 @@ from ..cosimulation.robot_cosimulation import (
 )
 from ..cosimulation.robot_wiring import (
     ORIENTATION_AXES,
-    PLATFORM,
     RobotWiring,
     measured_output_indices,
     result_columns,
     winch_input_ports,
 )
 from ..cosimulation.run_arguments import validate_fmus, validate_options
-from ..errors import ArgumentError, InputError
+from ..errors import InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
 from ..robot.schema import AXES, Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
@@ -46,7 +45,7 @@ from ..validation import (
 from .design import ControlAim, Design
 from .external_controller import SpeedLaw, designed, path_source
 from .feedforward import Reference, elastic_reference
-from .input_sources import AllColumnsSource, JoinedSources, SampledLoad, ZeroInput
+from .input_sources import AllColumnsSource, JoinedSources, ZeroInput, external_loads
 from .path_controller import controller_data
 
 Array = NDArray[np.float64]
@@ -54,10 +53,6 @@ Array = NDArray[np.float64]
 CONTROLLER_NAME = "controller"
 RUN_DURATION_RULE = OF_PATH._replace(meaning="the duration of the run")
 DESIGN_ATTRIBUTES = ("aim", "cable_count", "uses_feedback", "knots")
-FORCE_PORTS, MOMENT_PORTS = (
-    tuple(Port(PLATFORM, f"{name}{rate}.{axis}") for axis in AXES for rate in ("", "_rate"))
-    for name in ("external_force", "external_moment")
-)
 
 
 def sample_times(period: float, duration: float) -> Array:
@@ -112,8 +107,8 @@ def cosimulate_closed_loop(
 
     Raises ControllerError where a function fails, UnreachableError where the path requires a cable to push,
     StretchError where no speeds follow it, RunError where an FMU fails, ControllerFmuError where a controller FMU does
-    not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not match, ArgumentError
-    for an invalid argument.
+    not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not match, SlotError
+    where a load is on a user's platform without an input for it, ArgumentError for an invalid argument.
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)
@@ -130,7 +125,7 @@ def cosimulate_closed_loop(
     times = sample_times(controller.aim.period, duration)
     if options.reference is not None:
         _require_reference(caller, options.reference, len(times), robot)
-    loads, ports = _external_loads(caller, options, len(times), fmus.is_rigid)
+    loads, ports = external_loads(caller, fmus, len(times), options.external_force, options.external_moment)
     with path_source(robot, controller, trajectory, times, options.seed, options.reference) as path_controller:
         source = AllColumnsSource(
             path_controller, wiring.output_indices, len(wiring.outputs) + len(wiring.missing_columns)
@@ -206,14 +201,15 @@ def cosimulate_with_controller(
     ``time`` (N,) in s, rising, from 0; macro steps end at each of these times, which should contain the controller's
     samples.
 
-    Raises RunError where an FMU fails, ArgumentError for an invalid argument.
+    Raises RunError where an FMU fails, SlotError where a load is on a user's platform without an input for it,
+    ArgumentError for an invalid argument.
     """
     caller, options = "cosimulate_with_controller", options or RunOptions()
     validate_fmus(f"{caller}: fmus", fmus)
     components = {CONTROLLER_NAME: validate_file(f"{caller}: controller", controller)}
     instants = validate_increasing(f"{caller}: time", time, TIME_MEANING)
     validate_options(caller, options.step, None, options.progress, options.patience)
-    loads, ports = _external_loads(caller, options, len(instants), fmus.is_rigid)
+    loads, ports = external_loads(caller, fmus, len(instants), options.external_force, options.external_moment)
     zero_input = ZeroInput(len(winch_input_ports(len(fmus.cables))))
     extra = AdditionalComponents(components, controller_wires(fmus), ports)
     return _run(fmus, JoinedSources((zero_input, *loads)), instants, options, extra)
@@ -255,25 +251,6 @@ def _require_design(caller: str, robot: Robot, controller: Design, trajectory: T
         f"{caller}: controller", controller, DESIGN_ATTRIBUTES, "controller", "give what design_controller returns"
     )
     require_trajectory(f"{caller}: trajectory", trajectory)
-
-
-def _external_loads(
-    caller: str, options: RunOptions, count: int, is_rigid: bool
-) -> tuple[tuple[SampledLoad, ...], tuple[Port, ...]]:
-    """External force and moment as sources of inputs, and their ports; empty where there are none."""
-    sources: tuple[SampledLoad, ...] = ()
-    ports: tuple[Port, ...] = ()
-    if options.external_force is not None:
-        meaning = "finite forces in N, a row for each sample and columns x, y, z"
-        forces = validate_array(f"{caller}: external_force", options.external_force, (count, 3), meaning)
-        sources, ports = (SampledLoad(forces),), FORCE_PORTS
-    if options.external_moment is not None:
-        where, meaning = f"{caller}: external_moment", "finite moments in N m, a row for each sample, columns x, y, z"
-        if not is_rigid:
-            raise ArgumentError(where, options.external_moment, "acts on a point mass", "leave it out")
-        moments = validate_array(where, options.external_moment, (count, 3), meaning)
-        sources, ports = (*sources, SampledLoad(moments)), (*ports, *MOMENT_PORTS)
-    return sources, ports
 
 
 def _require_reference(caller: str, reference: Reference, count: int, robot: Robot) -> None:
