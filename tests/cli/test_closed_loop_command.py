@@ -46,6 +46,16 @@ def test_files_of_each_kind_close_the_loop(tmp_path: Path) -> None:
     assert by_function["z"].iloc[-1] < 5.02
 
 
+def test_the_run_begins_where_its_path_does(tmp_path: Path) -> None:
+    script = tmp_path / "law.py"
+    script.write_text(FUNCTION, encoding="utf-8")
+    (tmp_path / "path.toml").write_text(f"start = [28.8, 0.0, 5.05]\n{PATH}", encoding="utf-8")
+    files = ["--controller", str(script), "--path", str(tmp_path / "path.toml")]
+    assert run(["simulate", ROBOT, *files, "--until", "0.05", "--out", str(tmp_path / "result.csv")]) == 0
+    first = pd.read_csv(tmp_path / "result.csv")[["x", "y", "z"]].iloc[0]
+    assert first.to_numpy() == pytest.approx([28.8, 0.0, 5.05], abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

@@ -82,6 +82,22 @@ def test_the_run_until_then_is_written(
     assert list(scratch.iterdir()) == []
 
 
+def test_the_run_of_a_controller_until_then_is_written(
+    robot: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = scratch.parent / "result.csv"
+    (scratch / "law.py").write_text("def controller(time, measured):\n    return [0.0, 0.0, 0.0]\n", encoding="utf-8")
+    (scratch / "path.toml").write_text("end = [28.9, 0.05, 5.1]\nduration = 1.0\n", encoding="utf-8")
+    files = ["--controller", str(scratch / "law.py"), "--path", str(scratch / "path.toml"), "--out", str(out)]
+    assert run(["simulate", str(robot / "robot.toml"), *files, "--until", "0.02"]) == 0
+    assert "ports have no unit" in capsys.readouterr().err
+    monkeypatch.setenv(FAULT, "winch_2:step:crash:0.105")
+    assert run(["simulate", str(robot / "robot.toml"), *files]) == 1
+    stderr = capsys.readouterr().err
+    assert "FMU winch_2" in stderr and stderr.endswith(f"; the run up to then is in {out}\n")
+    assert pd.read_csv(out)["time"].to_numpy() == pytest.approx(np.arange(12) * 0.01)
+
+
 def test_nothing_is_written_where_nothing_was_computed(
     robot: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

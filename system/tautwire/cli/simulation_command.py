@@ -29,6 +29,8 @@ from .console import (
 )
 
 if TYPE_CHECKING:
+    from ..cosimulation.result_file import ResultFile
+    from ..cosimulation.robot_cosimulation import CosimulationResult
     from ..cosimulation.robot_wiring import Column
     from ..cosimulation.run_arguments import SimulationOptions
     from ..cosimulation.run_statistics import RunStatistics
@@ -170,15 +172,20 @@ def _simulate_closed_loop(
     output: CommandOutput,
 ) -> None:
     """Co-simulate with a controller."""
-    from ..campaigns.campaign_run import path_trajectory
+    from ..campaigns.campaign_run import at_path_start, path_trajectory
     from ..campaigns.plan_file import read_path_file
     from ..control import ClosedLoopOptions, cosimulate_closed_loop
     from ..control.controller_file import read_controller
     from ..cosimulation.result_file import open_result_file
+    from ..cosimulation.robot_cosimulation import RunError
+    from ..fmus.fmu_slots import check_user_fmus
     from ..fmus.packaging import build_fmus
 
     assert files.controller is not None and files.path is not None
-    trajectory = path_trajectory(robot, read_path_file(files.path, robot))
+    check_user_fmus(robot)
+    path = read_path_file(files.path, robot)
+    robot = at_path_start(robot, path)
+    trajectory = path_trajectory(robot, path)
     law = read_controller(files.controller, robot.cable_count, robot.platform.is_rigid_body)
     provenance = describe_origin()
     duration = trajectory.duration + SETTLING_TIME if options.until is None else options.until
@@ -191,10 +198,29 @@ def _simulate_closed_loop(
         loop_options = ClosedLoopOptions(
             step=options.step, progress=partial(progress, "co-simulating"), patience=options.call_timeout
         )
-        motion = cosimulate_closed_loop(fmus, robot, law, trajectory, duration, loop_options)
-        for row in motion.frame().to_numpy():
-            result.add(float(row[0]), row[1:])
-    _print_statistics(motion.statistics, motion.statistics.warnings(), {"result": files.out}, provenance, output)
+        try:
+            motion = cosimulate_closed_loop(fmus, robot, law, trajectory, duration, loop_options)
+        except RunError as error:
+            _add_rows(result, error.result)
+            raise
+        _add_rows(result, motion)
+    notes = _closed_loop_notes(robot, motion)
+    _print_statistics(motion.statistics, notes, {"result": files.out}, provenance, output)
+
+
+def _add_rows(result: ResultFile, motion: CosimulationResult) -> None:
+    for row in motion.frame().to_numpy():
+        result.add(float(row[0]), row[1:])
+
+
+def _closed_loop_notes(robot: Robot, motion: CosimulationResult) -> tuple[str, ...]:
+    """Notes on a run with a controller: on units, columns, and what the FMUs lack."""
+    from ..cosimulation.recording_simulation import missing_column_notes
+    from ..fmus.fmu_slots import notes_on_unstated_units
+
+    missing = missing_column_notes(motion.missing_columns)
+    statistics = motion.statistics
+    return (*notes_on_unstated_units(robot), *missing, *statistics.fallback_notes(), *statistics.warnings())
 
 
 def _result_columns(robot: Robot) -> list[Column]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,6 @@ from . import (
     StepSizeControl,
 )
 from .robot_cosimulation import record_cosimulation, step_size_control_for, wire_fmus
-from .robot_wiring import RobotWiring
 from .run_arguments import SimulationOptions
 
 Array = NDArray[np.float64]
@@ -141,7 +140,7 @@ def _run_with_error_estimate(
 
     step_size_control = step_size_control_for(options.step, options.tolerance, time)
     statistics = run(len(time), step_size_control, first_positions, "co-simulating")
-    notes = (*missing_column_notes(wire_fmus(fmus)), *statistics.fallback_notes())
+    notes = (*missing_column_notes(wire_fmus(fmus).missing_columns), *statistics.fallback_notes())
     if statistics.fallback_notes() and options.tolerance is None:
         notes = (*notes, step_doubling_note(run, time, options.step, first_positions.positions))
     return statistics, notes
@@ -159,10 +158,6 @@ def _sample_count(recording: Recording, until: float | None) -> int:
     return count
 
 
-def missing_column_notes(wiring: RobotWiring) -> tuple[str, ...]:
-    """A note on outputs that no FMU provides, so that the result has no column for them."""
-    return (
-        (f"not in the result, as no FMU outputs it: {', '.join(wiring.missing_columns)}",)
-        if wiring.missing_columns
-        else ()
-    )
+def missing_column_notes(missing_columns: Sequence[str]) -> tuple[str, ...]:
+    """A note on columns that the result lacks, as no FMU outputs them."""
+    return (f"not in the result, as no FMU outputs it: {', '.join(missing_columns)}",) if missing_columns else ()
