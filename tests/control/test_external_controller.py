@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.control import (
+    POSITION_NOISE,
     ClosedLoopOptions,
     ControlAim,
     ControllerError,
@@ -21,15 +23,18 @@ from tautwire.control import (
     design_controller,
     elastic_reference,
     fmu_controller,
+    function_controller,
     sample_times,
     speed_controller,
     state_space_controller,
 )
 from tautwire.control.controller_fmu import ControllerFmu, ControllerFmuError, Sample
+from tautwire.control.design import measurement_noise
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.errors import ArgumentError
 from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.schema import Sensors
 from tautwire.robot.trajectory import Line
 from tests.support.pythonfmu_command import build_by_command
 from tests.support.robots import example
@@ -263,6 +268,29 @@ def test_fmus_that_do_not_fit_are_refused(fmus: RobotFmus, tmp_path: Path) -> No
         closed_loop(fmus, wrong_output)
     with pytest.raises(ArgumentError, match="there is no file"):
         closed_loop(fmus, tmp_path / "absent.fmu")
+
+
+def test_a_controller_fmu_contains_no_function(tmp_path: Path) -> None:
+    law = function_controller(lambda time, measured: np.zeros(3), 3)
+    with pytest.raises(ArgumentError, match="is a function or an FMU, which no controller FMU contains"):
+        build_controller_fmu(ROBOT, law, PATH, 1.0, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_fmu_matched_for_another_platform_is_refused(fmus: RobotFmus, tmp_path: Path) -> None:
+    of_turning = fmu_controller(lqg_fmu(tmp_path), 3, is_rigid=True)
+    with pytest.raises(
+        ControllerFmuError, match=r"another platform; match it by fmu_controller\(path, 3, is_r"
+    ):
+        closed_loop(fmus, of_turning)
+
+
+def test_a_sensor_that_is_declared_without_noise_has_none() -> None:
+    sensors = Sensors(position_noise=0.0, tension_noise=2.0)
+    robot = replace(ROBOT, sensors=sensors)
+    assert measurement_noise(robot).tolist() == [0.0, 0.0, 0.0, 2.0, 2.0, 2.0]
+    assert measurement_noise(robot, positive=True).tolist() == [POSITION_NOISE] * 3 + [2.0] * 3
+    assert np.all(np.isfinite(design_controller(robot, AIM).knots()[0].regulator.A))
 
 
 def test_an_fmu_whose_initialization_fails_is_freed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -22,7 +23,7 @@ from tautwire.control import (
     shaper,
     shaper_for_modes,
 )
-from tautwire.control.input_shaping import ShaperKind
+from tautwire.control.input_shaping import ShapedTrajectory, ShaperKind
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.robot.trajectory import Line, Trajectory
@@ -65,6 +66,16 @@ def test_residual_is_the_swing_of_a_mode_after_the_last_impulse(kind: ShaperKind
     for frequency in (0.9, 1.2, 1.5):
         expected = np.sqrt(energy_after(impulses, frequency, damping_ratio))
         assert impulses.residual_vibration(frequency, damping_ratio) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_mode_that_does_not_swing_gets_no_impulses() -> None:
+    with pytest.raises(InputError, match=r"damping_ratio: is 1\.2, with which no mode swings"):
+        shaper(1.2, 1.2)
+    robot = replace(paper_robot(), cables=tuple(replace(each, damping=1e13) for each in paper_robot().cables))
+    path = shape_along(robot, PATH, points=3)
+    assert isinstance(path, ShapedTrajectory)
+    assert path.amplitudes.shape == (3, 1)
+    assert path.duration == pytest.approx(PATH.duration)
 
 
 def test_shapers_are_as_robust_as_the_textbook_says() -> None:

@@ -29,7 +29,7 @@ from ..cosimulation.robot_wiring import (
     winch_input_ports,
 )
 from ..cosimulation.run_arguments import validate_fmus, validate_options
-from ..errors import InputError
+from ..errors import ArgumentError, InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
 from ..robot.schema import AXES, Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
@@ -42,8 +42,9 @@ from ..validation import (
     validate_integer,
     validate_number,
 )
+from .controller_fmu import ControllerFmu, ControllerFmuError
 from .design import ControlAim, Design
-from .external_controller import SpeedLaw, designed, path_source
+from .external_controller import SpeedController, SpeedLaw, designed, path_source
 from .feedforward import Reference, elastic_reference
 from .input_sources import AllColumnsSource, JoinedSources, ZeroInput, external_loads
 from .path_controller import controller_data
@@ -184,6 +185,10 @@ def _controller_resource(
 ) -> tuple[dict[str, Any], Path]:
     """Resource of a controller FMU, and the folder that it goes to."""
     _require_design(caller, robot, controller, trajectory)
+    if isinstance(controller, SpeedController):
+        problem = "is a function or an FMU, which no controller FMU contains"
+        hint = "give a design or what state_space_controller returns; an FMU runs by cosimulate_with_controller"
+        raise ArgumentError(f"{caller}: controller", controller, problem, hint)
     validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
     target_folder = validate_folder(f"{caller}: folder", folder)
     times = sample_times(controller.aim.period, duration)
@@ -272,6 +277,10 @@ def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
     if fmus.is_rigid != robot.platform.is_rigid_body:
         turning = "that turns" if fmus.is_rigid else "that is a point mass"
         raise InputError(robot.name, f"has another platform than the FMUs, {turning}", "give those of one robot")
+    speeds_from = controller.speeds_from if isinstance(controller, SpeedController) else None
+    if isinstance(speeds_from, ControllerFmu) and speeds_from.is_rigid != fmus.is_rigid:
+        hint = f"match it by fmu_controller(path, {robot.cable_count}, is_rigid={fmus.is_rigid})"
+        raise ControllerFmuError(speeds_from.path, None, "it is matched for another platform", hint)
 
 
 def _require_measured(wiring: RobotWiring, where: str, cable_count: int, is_rigid: bool) -> None:

@@ -51,7 +51,7 @@ class ControllerFmu:
     """
 
     def __init__(self, path: Path, cable_count: int, is_rigid: bool = False) -> None:
-        self.path = path
+        self.path, self.is_rigid = path, is_rigid
         description = read_model_description(path)
         if description.fmiVersion not in INSTANCE_TYPES or description.coSimulation is None:
             problem = f"it is FMI {description.fmiVersion}, or not for co-simulation"

@@ -113,17 +113,19 @@ class ControlAim:
             raise ArgumentError("ControlAim: lowest_tension", lowest, problem, "lower it, or raise the other")
 
 
-def measurement_noise(robot: Robot) -> Array:
-    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,).
+def measurement_noise(robot: Robot, positive: bool = False) -> Array:
+    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,), as declared or by default.
 
-    Of a platform that turns those of the rotation about each axis (rad) follow the position, shape (6 + n,).
+    Of a platform that turns those of the rotation about each axis (rad) follow the position, shape (6 + n,). With
+    ``positive`` a declared zero is the default too: no Kalman filter has sensors without noise.
     """
     sensors, turning = robot.sensors, 3 if robot.platform.is_rigid_body else 0
-    noise = (
-        sensors.position_noise or POSITION_NOISE,
-        sensors.orientation_noise or ORIENTATION_NOISE,
-        sensors.tension_noise or TENSION_NOISE,
-    )
+    declared = (sensors.position_noise, sensors.orientation_noise, sensors.tension_noise)
+    defaults = (POSITION_NOISE, ORIENTATION_NOISE, TENSION_NOISE)
+    noise = [
+        default if value is None or (positive and value == 0.0) else value
+        for value, default in zip(declared, defaults, strict=True)
+    ]
     return np.repeat(noise, [3, turning, robot.cable_count])
 
 

@@ -74,8 +74,10 @@ def shaper(
 ) -> Shaper:
     """A shaper for one mode: undamped ``frequency`` in Hz; ``tolerated_vibration`` is the V of EI, relative.
 
-    Raises InputError where the kind is unknown.
+    Raises InputError where the kind is unknown, or the mode does not swing: its damping ratio is 1 or more.
     """
+    if not damping_ratio < 1.0:
+        raise InputError("damping_ratio", f"is {damping_ratio:g}, with which no mode swings", "give one below 1")
     damped_ratio = np.sqrt(1.0 - damping_ratio**2)
     outer, inner = 1.0 + tolerated_vibration, 2.0 - 2.0 * tolerated_vibration
     patterns = {"ZV": [1.0, 1.0], "ZVD": [1.0, 2.0, 1.0], "EI": [outer, inner, outer]}
@@ -88,7 +90,9 @@ def shaper(
 
 
 def shaper_for_modes(frequencies: Array, damping_ratios: Array, kind: ShaperKind = "ZV") -> Shaper:
-    """A shaper for several modes at once, one per mode in series."""
+    """A shaper for several modes at once, one per mode in series; of no mode one impulse at once."""
+    if not len(frequencies):
+        return Shaper(np.ones(1), np.zeros(1))
     singles = [shaper(f, zeta, kind) for f, zeta in zip(frequencies.tolist(), damping_ratios.tolist(), strict=True)]
     return reduce(Shaper.__mul__, singles)
 
@@ -170,7 +174,7 @@ def shape_along(
     """A trajectory under shapers for the modes, which vary with the platform's pose.
 
     They are all three of a point mass. Of a rigid platform they are those whose vibration the trajectory would leave
-    behind, each at least a fiftieth of the largest.
+    behind, each at least a fiftieth of the largest. Modes that are overdamped somewhere on the way do not count.
 
     Raises what :func:`tautwire.linear.modes_along` raises, UnreachableError where fewer than six cables cannot hold the
     platform along the path, and InputError as :func:`shaped` does.
@@ -178,10 +182,11 @@ def shape_along(
     times = np.linspace(0.0, trajectory.duration, points)
     modes = modes_along(robot, trajectory, times)
     frequencies, ratios = modes.frequencies, modes.damping_ratios
+    swings = np.all(ratios < 1.0, axis=0)
     if robot.platform.is_rigid_body:
         left = residual_amplitudes(robot, trajectory, modes)
-        matters = left >= MIN_RESIDUAL_SHARE * np.max(left)
-        frequencies, ratios = frequencies[:, matters], ratios[:, matters]
+        swings &= left >= MIN_RESIDUAL_SHARE * np.max(left[swings], initial=0.0)
+    frequencies, ratios = frequencies[:, swings], ratios[:, swings]
     shapers = [shaper_for_modes(f, z, kind) for f, z in zip(frequencies, ratios, strict=True)]
     delays = np.array([each.delays for each in shapers])
     amplitudes = np.array([each.amplitudes for each in shapers])

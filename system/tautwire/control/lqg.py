@@ -156,7 +156,7 @@ def _kalman_gain(robot: Robot, aim: ControlAim, linear: LinearPlant, plant: Any)
         np.eye(size)[:, freedoms:],
         plant.C[:-count, :size],
         np.diag(process_noise**2 * aim.period),
-        np.diag(measurement_noise(robot) ** 2),
+        np.diag(measurement_noise(robot, positive=True) ** 2),
         method=RICCATI_METHOD,
     )
     return np.asarray(gain)
