@@ -279,9 +279,7 @@ def test_a_controller_fmu_contains_no_function(tmp_path: Path) -> None:
 
 def test_an_fmu_matched_for_another_platform_is_refused(fmus: RobotFmus, tmp_path: Path) -> None:
     of_turning = fmu_controller(lqg_fmu(tmp_path), 3, is_rigid=True)
-    with pytest.raises(
-        ControllerFmuError, match=r"another platform; match it by fmu_controller\(path, 3, is_r"
-    ):
+    with pytest.raises(ControllerFmuError, match=r"another platform; match it by fmu_controller\(path, 3, is_r"):
         closed_loop(fmus, of_turning)
 
 

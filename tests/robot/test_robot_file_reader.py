@@ -207,6 +207,8 @@ def test_refuses_a_wrong_value(tmp_path: Path, old: str, new: str, key: str, wor
             "effect.payload[2]",
             ["twice", "effect.payload[1]"],
         ),
+        ("[effect.payload]\nmass = -80.0", "effect", ["a mass of 0 kg", "remove less than its 80 kg"]),
+        ("[formula]\nmass = '-90 + time'", "formula", ["a mass of -10 kg"]),
         (
             "[[effect.sensor_offset]]\nposition_offset_x = 0.01\ncables = [1]\n"
             "[[effect.sensor_offset]]\ntension_offset = 5.0\nposition_offset_z = 0.02\ncables = [2]",

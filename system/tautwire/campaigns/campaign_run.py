@@ -30,13 +30,13 @@ from ..linear import linearise
 from ..linear.linear_plant import LinearPlant
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
-from ..robot.active_effects import slack_tensions
 from ..robot.platform_symbols import StateIndices
 from ..robot.pose_path import pose_path, sample_poses
 from ..robot.pose_trajectory import PoseTrajectory, rotation_vectors_between, slerp
 from ..robot.robot_file_reader import robot_from_content
 from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
+from ..robot.static_load import slack_tensions
 from ..robot.trajectory import Helix, Line, Trajectory
 from ..robot.winch_speeds import ideal_winch_speeds
 from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan

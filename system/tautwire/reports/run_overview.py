@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..cosimulation import Recorder, RunStatistics
 from ..recordings.recording import Recording
-from ..robot.active_effects import slack_tensions
 from ..robot.schema import Robot
+from ..robot.static_load import slack_tensions
 
 Array = NDArray[np.float64]
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import log
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from tautwire_fmu.laws import effect_stages as stages
+from tautwire_fmu.laws import point_mass
 from tautwire_fmu.laws import rigid_body_effects as body_stages
-from tautwire_fmu.laws.effects import BY_NAME, SLACK, ActiveEffect
+from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.formula import formula_effect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.rigid_body import principal_axes
@@ -105,6 +103,12 @@ def body_constants(robot: Robot, mathematics: Mathematics = REAL, axes: Matrix |
     return body_stages.constants_with_effects(mathematics, declared, platform_effects(robot), shifting)
 
 
+def total_mass(robot: Robot, mathematics: Mathematics = REAL) -> Any:
+    """Mass of the platform with payload, in kg; at the start where a formula changes it."""
+    constants = point_mass.PointMassConstants(robot.platform.mass, robot.gravity)
+    return point_mass.total_mass(mathematics, constants, platform_effects(robot))
+
+
 def centre_of_mass(robot: Robot, mathematics: Mathematics = REAL) -> Vector:
     """Centre of mass of the platform with its effects, in its frame, in m; its origin for a point mass."""
     if not robot.platform.is_rigid_body:
@@ -144,12 +148,3 @@ def _formula_effects(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
         return ()
     numbers = {name: value for formula in formulas for name, value in formula.numbers.items()}
     return (ActiveEffect(formula_effect(formula_texts(formulas), tuple(numbers)), numbers),)
-
-
-def slack_tensions(robot: Robot) -> NDArray[np.float64]:
-    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
-    tension = np.zeros(robot.cable_count)
-    for setting in robot.effects:
-        if setting.name == SLACK.name:
-            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
-    return tension

@@ -13,10 +13,10 @@ from tautwire_fmu.laws.mathematics import REAL
 from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
-from .active_effects import shifts_position
+from .active_effects import shifts_position, total_mass
 from .checked_table import CheckedTable
 from .platform_reader import refuse_keys_of_rigid_bodies
-from .schema import AXES, PER_CABLE_COMPONENTS, EffectSetting, Formula, Point
+from .schema import AXES, PER_CABLE_COMPONENTS, EffectSetting, Formula, Point, Robot
 
 
 def read_effects(table: CheckedTable, cable_count: int, is_rigid: bool) -> tuple[EffectSetting, ...]:
@@ -70,6 +70,21 @@ def _read_effect(table: CheckedTable, effect: Effect, cable_count: int) -> Effec
 def _parameter_rule(parameter: Parameter) -> NumberRule:
     bounds = (parameter.minimum, parameter.maximum)
     return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
+
+
+def require_positive_mass(root: CheckedTable, robot: Robot) -> None:
+    """Refuses effects and formulas that leave the platform no mass at the start."""
+    adds_mass = any(BY_NAME[setting.name].inertia is not None for setting in robot.effects)
+    formula = next((each for each in robot.formulas if each.target == "mass"), None)
+    if not (adds_mass or formula):
+        return
+    try:
+        mass = float(total_mass(robot))
+    except (ArithmeticError, ValueError):
+        return
+    if not mass > 0.0 and robot.platform.mass > 0.0:
+        problem = f"with it the platform has a mass of {mass:g} kg"
+        root.refuse("formula" if formula else "effect", problem, f"remove less than its {robot.platform.mass:g} kg")
 
 
 def read_cable_list(table: CheckedTable, cable_count: int) -> tuple[int, ...]:

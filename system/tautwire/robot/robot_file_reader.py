@@ -18,7 +18,7 @@ from ..name_suggestions import suggest_name
 from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
-from .effect_tables import read_cable_list, read_effects, read_formulas
+from .effect_tables import read_cable_list, read_effects, read_formulas, require_positive_mass
 from .platform_reader import (
     ADD_INERTIA,
     CABLE_KEYS,
@@ -190,7 +190,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
     cables = _read_cables(root, platform)
     tension, sensors, effect = root.table("tension"), root.table("sensors"), root.table("effect")
     winch, fmu = root.table("winch"), root.table("fmu")
-    return Robot(
+    robot = Robot(
         name=name,
         gravity=gravity,
         platform=platform,
@@ -205,6 +205,8 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         tracker=read_tracker_table(root),
         native_fmus=_read_native_fmus(fmu) if fmu else False,
     )
+    require_positive_mass(root, robot)
+    return robot
 
 
 def _read_name(root: CheckedTable, default: str) -> str:

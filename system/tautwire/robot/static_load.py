@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import log
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws import point_mass
 from tautwire_fmu.laws.effect_stages import Route
+from tautwire_fmu.laws.effects import SLACK
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.vectors import Vector, add, subtract
 
-from .active_effects import cable_effects, platform_effects
+from .active_effects import cable_effects, platform_effects, total_mass
 from .cable_routes import cable_routes
 from .schema import Robot
 
@@ -26,8 +28,7 @@ CONVERGENCE_TOLERANCE = 1e-14
 
 def total_weight(robot: Robot, mathematics: Mathematics = REAL) -> Any:
     """Weight of the platform with payload, in N."""
-    constants = point_mass.PointMassConstants(robot.platform.mass, robot.gravity)
-    return point_mass.total_mass(mathematics, constants, platform_effects(robot)) * robot.gravity
+    return total_mass(robot, mathematics) * robot.gravity
 
 
 def static_load(mathematics: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
@@ -64,3 +65,12 @@ def fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
         if np.max(np.abs(tensions - previous)) <= CONVERGENCE_TOLERANCE * np.max(tensions):
             break
     return tensions
+
+
+def slack_tensions(robot: Robot) -> Array:
+    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
+    tension = np.zeros(robot.cable_count)
+    for setting in robot.effects:
+        if setting.name == SLACK.name:
+            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
+    return tension
