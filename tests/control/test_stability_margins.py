@@ -23,7 +23,7 @@ from tautwire.control import (
     robot_with,
     speed_controller,
 )
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.robots import example
 
 Array = NDArray[np.float64]
@@ -95,6 +95,9 @@ def test_all_winches_may_change_at_once_by_what_the_disk_margin_says(design: Con
 
 def test_range_is_that_of_the_papers_rope_or_as_wide_about_another_one(caroca: Robot) -> None:
     assert Range.of(caroca) == Range((102e9, 135e9), (0.8, 1.2))
+    softer = caroca.with_effect(EffectSetting("modulus", {"modulus": 60e9}, caroca.cable_numbers))
+    assert Range.of(softer) == Range.of(robot_with(caroca, 60e9, 1.0))
+    assert robot_with(softer, 1e11, 1.0) == robot_with(caroca, 1e11, 1.0)
     soft = Range.of(robot_with(caroca, 60e9, 1.0))
     assert soft.payloads == (0.8, 1.2)
     assert soft.moduli == pytest.approx((60e9 * 102 / 118.5, 60e9 * 135 / 118.5))

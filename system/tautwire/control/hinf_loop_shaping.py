@@ -25,6 +25,7 @@ from slycot import sb10ad
 from threadpoolctl import threadpool_limits
 
 from ..linear import LinearPlant, linearise
+from ..robot.active_effects import cable_moduli
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
@@ -257,7 +258,7 @@ def _shape_regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth
     integrated = integrated_freedoms(count, freedoms)
     lowest_frequency = _lowest_frequency(linear)
     lengths = np.linalg.norm(np.array(robot.anchors) - linear.position, axis=1)
-    stiffness = float(np.mean([cable.modulus * cable.area for cable in robot.cables] / lengths))
+    stiffness = float(np.mean(np.array(cable_moduli(robot)) * [cable.area for cable in robot.cables] / lengths))
     # A rotation weighs as much as the attachments' displacement by it.
     speed = bandwidth * lowest_frequency
     pose_weights = np.repeat([speed, speed * platform_size(robot)], [3, freedoms - 3])

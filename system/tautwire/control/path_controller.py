@@ -15,6 +15,7 @@ from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..cosimulation.robot_wiring import measured_output_indices
 from ..errors import InputError
+from ..robot.active_effects import cable_moduli
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import start_attachments
 from ..robot.trajectory import Trajectory
@@ -69,7 +70,7 @@ def control_limits(robot: Robot, design: Design) -> Limits:
 def cable_compliances(robot: Robot) -> Array:
     """Compliance of each cable at the start, ``l / (E S)``, shape (n,), in m/N."""
     lengths = np.linalg.norm(np.array(robot.anchors) - np.array(start_attachments(robot)), axis=1)
-    stiffness = np.array([cable.modulus * cable.area for cable in robot.cables])
+    stiffness = np.array(cable_moduli(robot)) * [cable.area for cable in robot.cables]
     result: Array = lengths / stiffness
     return result
 

@@ -16,7 +16,10 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire_fmu.laws.effects import MODULUS
+
 from ..linear import LinearPlant, linearise
+from ..robot.active_effects import cable_moduli
 from ..robot.schema import Robot
 from .design import Knot
 from .sampled_plant import ramp_plant
@@ -77,7 +80,7 @@ class Range:
     @classmethod
     def of(cls, robot: Robot) -> Range:
         """The range of a robot: the paper's rope from static to dynamic modulus, other ropes in proportion."""
-        moduli = [cable.modulus for cable in robot.cables]
+        moduli = cable_moduli(robot)
         lowest, highest = cls.moduli
         if lowest <= min(moduli) and max(moduli) <= highest:
             return cls()
@@ -96,13 +99,17 @@ class Range:
 
 
 def robot_with(robot: Robot, modulus: float, payload: float) -> Robot:
-    """The robot with another modulus (Pa) of all cables, and its mass and inertia times ``payload``."""
+    """The robot with another modulus (Pa) of all cables, and its mass and inertia times ``payload``.
+
+    The modulus takes the place of one that the effect ``modulus`` sets, too.
+    """
+    effects = tuple(setting for setting in robot.effects if setting.name != MODULUS.name)
     cables = tuple(replace(cable, modulus=modulus) for cable in robot.cables)
     platform = replace(robot.platform, mass=payload * robot.platform.mass)
     if platform.inertia is not None:
         xx, yy, zz = ((payload * x, payload * y, payload * z) for x, y, z in platform.inertia)
         platform = replace(platform, inertia=(xx, yy, zz))
-    return replace(robot, cables=cables, platform=platform)
+    return replace(robot, cables=cables, platform=platform, effects=effects)
 
 
 def speed_controller(regulator: Any) -> Any:

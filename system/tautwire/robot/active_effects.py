@@ -8,7 +8,7 @@ from typing import Any
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws import point_mass
 from tautwire_fmu.laws import rigid_body_effects as body_stages
-from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
+from tautwire_fmu.laws.effects import BY_NAME, MODULUS, ActiveEffect
 from tautwire_fmu.laws.formula import formula_effect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.rigid_body import principal_axes
@@ -35,6 +35,15 @@ def cable_settings(robot: Robot, cable: int) -> tuple[EffectSetting, ...]:
 def cable_effects(robot: Robot, cable: int) -> tuple[ActiveEffect, ...]:
     """The effects of :func:`cable_settings` and the formulas in the cable, as the laws take them."""
     return (*map(active_effect, cable_settings(robot, cable)), *_formula_effects(robot.formulas_on(cable)))
+
+
+def cable_moduli(robot: Robot) -> tuple[float, ...]:
+    """Modulus of each cable (n,) in Pa: the declared one, or that of the effect ``modulus``."""
+    moduli = [cable.modulus for cable in robot.cables]
+    for setting in robot.effects:
+        for cable in setting.cables if setting.name == MODULUS.name else ():
+            moduli[cable - 1] = setting.values["modulus"]
+    return tuple(moduli)
 
 
 def attachment_settings(robot: Robot, cable: int) -> tuple[EffectSetting, ...]:
