@@ -122,11 +122,11 @@ class Slave(Fmi2Slave):
             if input_values[0] != real[0]:
                 self.previous_inputs = tuple(real[: self.input_count])
             real[: self.input_count] = input_values
+            self.elapsed = 0.0
         else:
             self._set_selected(vrs, values)
         self.outputs_stale = True
         self.inputs_unchanged = False
-        self.elapsed = 0.0
 
     def _set_selected(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         real, highest = self.real, max(vrs)
@@ -138,6 +138,8 @@ class Slave(Fmi2Slave):
             vrs, values = self._select_known(vrs, values)
         for reference, value in zip(vrs, values):
             real[reference] = value
+            if reference < self.input_count:
+                self.elapsed = 0.0
         if highest >= self.first_parameter:
             self.parameters_changed()
 

@@ -89,6 +89,17 @@ def test_inputs_are_extrapolated_by_their_rates(three_fmus: RobotFmus) -> None:
         assert platform.get("velocity.x", "acceleration.x") == pytest.approx([0.01, 0.2], rel=1e-12)
 
 
+def test_a_parameter_set_after_a_step_leaves_the_inputs_extrapolated(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.set(force_1__x=0.0, force_2__x=0.0, force_3__x=0.0, force_rate_1__x=600.0)
+        platform.run()
+        platform.step(0.0, 0.1)
+        platform.set(mass=150.0)
+        assert platform.get("acceleration.x") == pytest.approx([0.4], rel=1e-12)
+        platform.set(force_rate_1__x=600.0)
+        assert platform.get("acceleration.x") == [0.0]
+
+
 def test_stamped_inputs_run_on_the_cubic_through_both_ends(three_fmus: RobotFmus) -> None:
     force = np.polynomial.Polynomial([30.0, -200.0, 5000.0, 9000.0])
     acceleration = force / 300.0

@@ -218,6 +218,34 @@ def test_derivatives_of_inputs_are_the_inputs_that_are_their_rates(plain_fmus: R
     assert shown[0][2] == pytest.approx(0.3 * 0.02**2 / 2, rel=1e-12)
 
 
+MOVING = {
+    "cable_1": ({"velocity__x": 0.2, "acceleration__z": 0.7, "winch_speed": 0.4, "winch_acceleration": -0.2}, "modulus"),
+    "platform": ({"force_rate_1__x": 600.0, "external_force_rate__z": -40.0}, "mass"),
+    "winch_1": ({"speed_command": 0.1, "speed_command_rate": 2.0}, "damping_ratio"),
+}
+
+
+@pytest.mark.parametrize("component", MOVING)
+def test_parameters_set_between_steps_leave_the_inputs_extrapolated(
+    complete_fmus: tuple[RobotFmus, RobotFmus], component: str
+) -> None:
+    inputs, parameter = MOVING[component]
+    shown = []
+    for fmus in complete_fmus:
+        with in_hand(fmus.by_component[component]) as hand:
+            outputs = [v.name for v in hand.description.modelVariables if v.causality == "output"]
+            hand.set(**inputs)
+            hand.run()
+            hand.step(0.0, 0.1)
+            before, (value,) = hand.get(*outputs), hand.get(parameter)
+            hand.set(**{parameter: value})
+            assert hand.get(*outputs) == pytest.approx(before, rel=1e-12, abs=1e-12)
+            hand.set(**{parameter: 1.1 * value})
+            shown.append(hand.get(*outputs))
+    assert shown[0] != pytest.approx(before, rel=1e-3)
+    assert shown[0] == pytest.approx(shown[1], rel=SAME, abs=SAME)
+
+
 def test_parameters_that_are_set_move_the_start(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     lengths = []
     for fmus in complete_fmus:

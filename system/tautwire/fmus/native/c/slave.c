@@ -94,12 +94,12 @@ static int set_variables(Slave *slave, const unsigned int *references, size_t co
       memcpy(state->previous_inputs, state->real, sizeof state->previous_inputs);
       state->has_previous_inputs = 1;
     }
-  for (k = 0; k < count; k++) state->real[references[k]] = values[k];
-  if (sets_parameter) parameters_changed(slave);
-  if (count) {
-    slave->outputs_stale = 1;
-    state->elapsed = 0.0;
+  for (k = 0; k < count; k++) {
+    state->real[references[k]] = values[k];
+    if (references[k] < INPUT_COUNT) state->elapsed = 0.0;
   }
+  if (sets_parameter) parameters_changed(slave);
+  if (count) slave->outputs_stale = 1;
   return STATUS_OK;
 }
 
