@@ -202,24 +202,11 @@ def test_parameters_outside_their_bounds_and_inputs_not_finite_are_refused(plain
             cable.step(0.0, 0.01)
 
 
-def test_derivatives_of_inputs_are_the_inputs_that_are_their_rates(plain_fmus: RobotFmus) -> None:
-    shown = []
-    for by_derivative in (False, True):
-        with in_hand(plain_fmus.cables[0]) as cable:
-            cable.run()
-            if by_derivative:
-                references = [cable.references[name] for name in ("winch_speed", "position.x", "position.x")]
-                cable.fmu.setRealInputDerivatives(references, [1, 1, 2], [0.3, 0.1, -2.0])
-            else:
-                cable.set(winch_acceleration=0.3, velocity__x=0.1, acceleration__x=-2.0)
-            cable.step(0.0, 0.02)
-            shown.append(cable.get("tension", "force.x", "wound_length"))
-    assert shown[0] == shown[1]
-    assert shown[0][2] == pytest.approx(0.3 * 0.02**2 / 2, rel=1e-12)
-
-
 MOVING = {
-    "cable_1": ({"velocity__x": 0.2, "acceleration__z": 0.7, "winch_speed": 0.4, "winch_acceleration": -0.2}, "modulus"),
+    "cable_1": (
+        {"velocity__x": 0.2, "acceleration__z": 0.7, "winch_speed": 0.4, "winch_acceleration": -0.2},
+        "modulus",
+    ),
     "platform": ({"force_rate_1__x": 600.0, "external_force_rate__z": -40.0}, "mass"),
     "winch_1": ({"speed_command": 0.1, "speed_command_rate": 2.0}, "damping_ratio"),
 }

@@ -187,28 +187,31 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
   return refuse((Instance *)c, "this FMU provides no directional derivatives");
 }
 
+/* Derivatives beyond the inputs that are rates are ignored: FMI allows the status discard in other functions only. */
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t count,
                                        const fmi2Integer orders[], const fmi2Real values[]) {
   Instance *instance = (Instance *)c;
+  fmi2Status status = fmi2OK;
   size_t k;
   for (k = 0; k < count; k++) {
     unsigned int rate = derivative_of(references[k], orders[k]);
-    if (references[k] >= INPUT_COUNT || orders[k] < 1 || rate >= INPUT_COUNT)
-      return refuse(instance, "this input has no derivative of this order");
-    if (set_variables(&instance->slave, &rate, 1, values + k) != STATUS_OK) return fmi2Error;
+    if (references[k] >= INPUT_COUNT || orders[k] < 1)
+      return refuse(instance, "only inputs have derivatives to set, of order 1 or higher");
+    if (rate >= INPUT_COUNT) {
+      log_message(&instance->slave, STATUS_WARNING, "a derivative of an order that its input does not have is ignored");
+      status = fmi2Warning;
+    } else if (set_variables(&instance->slave, &rate, 1, values + k) != STATUS_OK)
+      return fmi2Error;
   }
-  return fmi2OK;
+  return status;
 }
 
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t count,
                                         const fmi2Integer orders[], fmi2Real values[]) {
-  Instance *instance = (Instance *)c;
   size_t k;
-  for (k = 0; k < count; k++) {
-    unsigned int rate = derivative_of(references[k], orders[k]);
-    if (orders[k] < 1 || rate >= VARIABLE_COUNT) return refuse(instance, "this output has no derivative of this order");
-    if (get_variables(&instance->slave, &rate, 1, values + k) != STATUS_OK) return fmi2Error;
-  }
+  for (k = 0; k < count; k++)
+    if (get_output_derivative(&((Instance *)c)->slave, references[k], orders[k], values + k) != STATUS_OK)
+      return fmi2Error;
   return fmi2OK;
 }
 

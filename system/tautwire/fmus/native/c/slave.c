@@ -267,3 +267,14 @@ static unsigned int derivative_of(unsigned int reference, int order) {
   while (order-- > 0 && reference < VARIABLE_COUNT) reference = rate_references[reference];
   return reference;
 }
+
+/* The derivative of some order of an output; by FMI it is 0 where the output has none of this order. */
+static int get_output_derivative(Slave *slave, unsigned int reference, int order, double *value) {
+  unsigned int rate = derivative_of(reference, order);
+  if (reference >= VARIABLE_COUNT || !is_output[reference] || order < 1) {
+    log_message(slave, STATUS_ERROR, "only outputs have derivatives to get, of order 1 or higher");
+    return STATUS_ERROR;
+  }
+  *value = 0.0;
+  return rate < VARIABLE_COUNT ? get_variables(slave, &rate, 1, value) : STATUS_OK;
+}
