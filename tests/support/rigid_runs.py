@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tautwire.cosimulation import RunStatistics
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.estimation.trace_result import Comparison, Errors, Trace
 from tautwire.recordings.recording import Recording
 from tautwire.reports.run_overview import ReportedRun, RunOverview
 from tautwire.robot.schema import Robot
+from tests.support.traces import made_trace
 
 
 def made_rigid_recording(robot: Robot, samples: int) -> Recording:
@@ -40,3 +45,21 @@ def made_rigid_run(robot: Robot, samples: int) -> ReportedRun:
         overview.add(float(time), row)
     statistics = RunStatistics(steps=samples, iterations=17, energy_residual=1e-7, energy_exchanged=250.0)
     return ReportedRun(robot, columns, overview, recording, statistics)
+
+
+def made_rigid_trace(robot: Robot, samples: int) -> Trace:
+    """A trace of that recording, which both models follow to the noise."""
+    recording = made_rigid_recording(robot, samples)
+    nothing = np.zeros_like(recording.tension)
+    motion = CosimulationResult(
+        recording.time,
+        recording.position,
+        np.zeros_like(recording.position),
+        recording.tension,
+        *(nothing, nothing, nothing),
+        orientation=recording.orientation,
+    )
+    trace = made_trace(check=False, samples=100)
+    errors = Errors(1e-4, 2.0, np.full(3, 1e-4), np.full(robot.cable_count, 2.0), 1e-4, np.full(3, 1e-4))
+    comparison = Comparison("fit", recording, motion, motion, errors, errors)
+    return replace(trace, robot_before=robot, robot_after=robot, comparisons=(comparison,), noise_floor=errors)

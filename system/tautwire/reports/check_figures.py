@@ -10,14 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..number_format import format_significant
-from ..recordings.geometry_reading import GeometryReading, RecordedPoses, recorded_poses, unturned
+from ..recordings.geometry_reading import GeometryReading, recorded_poses
 from ..recordings.quaternion_columns import unit_quaternions
 from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps
-from ..robot.cable_routes import attachment_points
 from ..robot.schema import Robot
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
-from .robot_scene import RobotScene, ScenePath, frame_indices
+from .robot_scene import RobotScene, ScenePath, body_attachments, frame_indices
 
 Array = NDArray[np.float64]
 
@@ -69,22 +68,14 @@ def robot_scene(robot: Robot, recording: Recording | None) -> RobotScene:
     if recording is None:
         platform = np.array([robot.platform.start], dtype=float)
         nothing = np.full((1, robot.cable_count), np.nan)
-        return RobotScene(np.zeros(1), platform, nothing, (), attachments=_attachments(robot, unturned(platform)))
+        return RobotScene(np.zeros(1), platform, nothing, (), attachments=body_attachments(robot, platform))
     rows = frame_indices(recording.sample_count, 1, robot.cable_count, robot.platform.is_rigid_body)
     position, orientation = GeometryReading().positions(robot, recorded_poses(recording)), recording.orientation
     platform = bridge_short_gaps(recording.time, position)[rows]
     turned = unit_quaternions(bridge_short_gaps(recording.time, orientation))[rows]
     path = ScenePath("recorded", platform, "accent", 5)
-    attachments = _attachments(robot, RecordedPoses(platform, turned))
+    attachments = body_attachments(robot, platform, turned if recording.has_orientation else None)
     return RobotScene(recording.time[rows], platform, recording.tension[rows], (path,), attachments=attachments)
-
-
-def _attachments(robot: Robot, poses: RecordedPoses) -> Array | None:
-    """Where the cables hold a rigid platform at poses (N,), (N, n, 3) in m; None of a point mass."""
-    if not robot.platform.is_rigid_body:
-        return None
-    quaternions = GeometryReading().orientations(robot, poses)
-    return np.array(attachment_points(robot, poses.position.T, quaternions.T)).transpose(2, 0, 1)
 
 
 def _curve_data(curve: CheckCurve, points: int) -> dict[str, Any]:

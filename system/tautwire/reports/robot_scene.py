@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ..recordings.sensor_gaps import bridge_short_gaps
+from ..robot.cable_routes import attachment_points
+from ..robot.schema import Robot
 from .downsampling import evenly_spaced_indices, pack_float32
 
 Array = NDArray[np.float64]
@@ -74,6 +76,17 @@ def measured_path(time: Array, points: Array, path: Array) -> Array:
     Between points their deviation from that path is linear, where no gap is; along axes that were not measured it is 0.
     """
     return path + bridge_short_gaps(time, fill_unmeasured(points, path) - path)
+
+
+def body_attachments(robot: Robot, position: Array, orientation: Array | None = None) -> Array | None:
+    """Where the cables hold a rigid platform, (N, n, 3) in m, at positions (N, 3) in m; None for a point mass.
+
+    ``orientation`` (N, 4), unit quaternions, is by default that of the robot file.
+    """
+    if not robot.platform.is_rigid_body:
+        return None
+    points = attachment_points(robot, position.T, None if orientation is None else orientation.T)
+    return np.array(points).transpose(2, 0, 1)
 
 
 def pack_columns(values: Array) -> list[str]:

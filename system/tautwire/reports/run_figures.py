@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.rotation import rotate
-
 from ..cosimulation.robot_wiring import ORIENTATION_AXES
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..recordings.sensor_gaps import bridge_short_gaps
-from ..robot.active_effects import attachments
 from ..robot.schema import AXES
 from .downsampling import envelope_times, min_max_envelope, pack_float32
 from .robot_scene import (
     MAGNIFICATIONS,
     RobotScene,
     ScenePath,
+    body_attachments,
     deviation_magnification,
     frame_indices,
     measured_path,
@@ -179,6 +177,7 @@ def _run_scene(run: ReportedRun) -> RobotScene:
     sample_indices = recorded_rows[row_indices]
     path = _columns_by_name(overview.rows, run.column_indices("", AXES), AXES)
     platform = path[row_indices]
+    orientation = _columns_by_name(rows, run.column_indices("q", ORIENTATION_AXES), ORIENTATION_AXES)
     paths = [ScenePath("co-simulated", platform, "accent", 5)]
     if recording.has_position:
         bridged = bridge_short_gaps(recording.time, recording.position)
@@ -192,18 +191,8 @@ def _run_scene(run: ReportedRun) -> RobotScene:
         paths=tuple(paths),
         measured_tension=recording.tension[sample_indices] if recording.has_tension else None,
         magnification=magnification,
-        attachments=_attachments(run, rows, platform),
+        attachments=body_attachments(robot, platform, orientation),
     )
-
-
-def _attachments(run: ReportedRun, rows: Array, platform: Array) -> Array | None:
-    """Where the cables hold a rigid body (N, n, 3) in m, by its orientation in some rows; None for a point mass."""
-    if not run.robot.platform.is_rigid_body:
-        return None
-    parts = _columns_by_name(rows, run.column_indices("q", ORIENTATION_AXES), ORIENTATION_AXES).T
-    points = [rotate(parts, attachment) for attachment in attachments(run.robot)]
-    turned: Array = np.array(points).transpose(2, 0, 1)
-    return platform[:, None] + turned
 
 
 def _columns_by_name(rows: Array, column_indices: Mapping[int, str], names: Sequence[object]) -> Array:

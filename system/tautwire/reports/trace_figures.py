@@ -24,6 +24,7 @@ from .robot_scene import (
     MAGNIFICATIONS,
     RobotScene,
     ScenePath,
+    body_attachments,
     deviation_magnification,
     fill_unmeasured,
     frame_indices,
@@ -131,22 +132,24 @@ def _spectrum_data(time: Array, before: Array, after: Array, sigma: float) -> di
 
 def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
     """The scene of the extended model's run, with the paths of the declared model and of the recording."""
-    recording = comparison.recording
-    indices = frame_indices(recording.time.size, 3, trace.robot_after.cable_count)
+    recording, robot, orientation = comparison.recording, trace.robot_after, comparison.after.orientation
+    indices = frame_indices(recording.time.size, 3, robot.cable_count, robot.platform.is_rigid_body)
+    platform = comparison.after.position[indices]
     paths = [
         ScenePath("before", comparison.before.position[indices], "before", 4),
-        ScenePath("after", comparison.after.position[indices], "accent", 5),
+        ScenePath("after", platform, "accent", 5),
     ]
     if recording.has_position:
         measured = measured_path(recording.time, recording.position, comparison.after.position)
         paths.insert(0, ScenePath("measured", measured[indices], "measured", 2, "dot"))
     return RobotScene(
         time=recording.time[indices],
-        platform=comparison.after.position[indices],
+        platform=platform,
         tension=comparison.after.tension[indices],
         paths=tuple(paths),
         measured_tension=recording.tension[indices] if recording.has_tension else None,
         magnification=_trace_magnification(trace, comparison),
+        attachments=body_attachments(robot, platform, None if orientation is None else orientation[indices]),
     )
 
 
