@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tautwire.estimation.trace_result import Resonance
-from tautwire.linear import modes_along
+from tautwire.linear import linearise, modes_along
 from tautwire.reports.mode_bands import merge_mode_bands, mode_bands, resonance_bands
-from tautwire.reports.trace_figures import trace_page_data
+from tautwire.reports.trace_figures import spectrum_bands, trace_page_data
 from tautwire.reports.trace_report_page import trace_page
 from tests.support.pages import Page
+from tests.support.rigid_robots import crane_robot
+from tests.support.rigid_runs import made_rigid_trace
 from tests.support.robots import example
 from tests.support.traces import made_trace
 
@@ -24,6 +27,19 @@ def test_bands_span_the_modes_along_the_path() -> None:
     bands = mode_bands(robot, path)
     assert min(band.low for band in bands) == pytest.approx(frequencies.min(), rel=0.01)
     assert max(band.high for band in bands) == pytest.approx(frequencies.max(), rel=0.01)
+
+
+def test_bands_of_a_rigid_platform_are_those_at_its_orientation_on_the_way() -> None:
+    robot, position = crane_robot(), np.tile(crane_robot().platform.start, (5, 1))
+    turned = np.roll(Rotation.from_rotvec((0.0, 0.0, 0.5)).as_quat(), 1)
+    frequencies = linearise(robot, position[0], orientation=turned).modes.frequencies
+    assert frequencies[0] != pytest.approx(linearise(robot).modes.frequencies[0], rel=0.03)
+    # An FMU's quaternions are of norm 1 but for its integration error.
+    bands = mode_bands(robot, position, np.tile(1.0001 * turned, (5, 1)))
+    assert bands[0].low == pytest.approx(frequencies[0], rel=0.01)
+    trace = made_rigid_trace(robot, 5)
+    motion = replace(trace.comparisons[0].after, position=position, orientation=np.tile(turned, (5, 1)))
+    assert spectrum_bands(trace, replace(trace.comparisons[0], after=motion))[0].low == pytest.approx(bands[0].low)
 
 
 def test_modes_that_lie_apart_have_bands_of_their_own_and_others_share_one() -> None:

@@ -13,6 +13,7 @@ from ..errors import TautwireError
 from ..estimation.trace_result import Resonance
 from ..linear import linearise
 from ..number_format import format_significant
+from ..recordings.quaternion_columns import unit_quaternions
 from ..robot.schema import Robot
 from .downsampling import evenly_spaced_indices
 
@@ -44,16 +45,19 @@ class Band:
         return vars(self).copy()
 
 
-def mode_bands(robot: Robot, path: Array) -> list[Band]:
-    """Bands of a robot's modes along a ``path`` (N, 3) in m, close ones merged; none without an operating point."""
-    finite = path[np.isfinite(path).all(axis=1)]
+def mode_bands(robot: Robot, path: Array, orientation: Array | None = None) -> list[Band]:
+    """Bands of a robot's modes along a ``path`` (N, 3) in m, close ones merged; none without an operating point.
+
+    ``orientation`` (N, 4) are the unit quaternions of a rigid platform there, by default that of the robot file.
+    """
+    poses = path if orientation is None else np.hstack([path, unit_quaternions(orientation)])
+    finite = poses[np.isfinite(poses).all(axis=1)]
     if len(finite) < 2:
         return []
-    positions = finite[evenly_spaced_indices(len(finite), PATH_SAMPLES)]
+    samples = finite[evenly_spaced_indices(len(finite), PATH_SAMPLES)]
+    plants = (linearise(robot, pose[:3], 0.0, None if orientation is None else pose[3:]) for pose in samples)
     try:
-        return merge_mode_bands(
-            np.array([linearise(robot, position, swing=0.0).modes.frequencies for position in positions])
-        )
+        return merge_mode_bands(np.array([plant.modes.frequencies for plant in plants]))
     except TautwireError:
         return []
 

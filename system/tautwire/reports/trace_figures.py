@@ -85,7 +85,8 @@ def _recording_data(trace: Trace, comparison: Comparison) -> dict[str, Any]:
 def spectrum_bands(trace: Trace, comparison: Comparison) -> list[Band]:
     """Bands of the extended model's modes along a run, and of resonances in that recording that the model lacks."""
     resonances = [each for each in trace.resonances if comparison.role in each.on]
-    return [*mode_bands(trace.robot_after, comparison.after.position), *resonance_bands(resonances)]
+    after = comparison.after
+    return [*mode_bands(trace.robot_after, after.position, after.orientation), *resonance_bands(resonances)]
 
 
 def _channel_data(
