@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,23 @@ def test_page_of_a_rigid_platform_shows_its_rotation_and_its_attachments(tmp_pat
     shown = np.array([unpack_float32(column) for column in scene["attachments"][2]])[:, 0]
     expected = recording.position[0] + rotation_of(recording.orientation[0]).apply(robot.attachments[2])
     assert shown == pytest.approx(expected, rel=1e-6)
+
+
+def test_the_rotation_by_a_tracker_slower_than_the_log_is_drawn_through_its_samples() -> None:
+    recording = noisy(wandering_recording(crane_robot()))
+    sample = np.arange(recording.sample_count)[:, None]
+    is_lost = (sample >= 200) & (sample < 260)
+    slow = replace(recording, orientation=np.where((sample % 4 > 0) | is_lost, np.nan, recording.orientation))
+    drawn, whole = (
+        np.array([unpack_float32(panel["curves"][0]["y"]) for panel in each if panel["title"] == "Rotation"])
+        for each in (
+            Page(check_page(CheckedFiles(crane_robot(), read, (), ()), {})).data()["choices"][0]["channels"]
+            for read in (slow, recording)
+        )
+    )
+    assert np.isfinite(drawn[:, :197]).all() and np.isnan(drawn[:, 197:260]).all()
+    assert np.isfinite(drawn[:, 260:-3]).all()
+    assert drawn[:, :197] == pytest.approx(whole[:, :197], abs=0.05 * np.abs(whole).max())
 
 
 def test_page_of_a_rigid_platform_alone_draws_it_at_its_start() -> None:

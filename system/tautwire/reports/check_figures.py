@@ -70,12 +70,17 @@ def robot_scene(robot: Robot, recording: Recording | None) -> RobotScene:
         nothing = np.full((1, robot.cable_count), np.nan)
         return RobotScene(np.zeros(1), platform, nothing, (), attachments=body_attachments(robot, platform))
     rows = frame_indices(recording.sample_count, 1, robot.cable_count, robot.platform.is_rigid_body)
-    position, orientation = GeometryReading().positions(robot, recorded_poses(recording)), recording.orientation
+    position = GeometryReading().positions(robot, recorded_poses(recording))
     platform = bridge_short_gaps(recording.time, position)[rows]
-    turned = unit_quaternions(bridge_short_gaps(recording.time, orientation))[rows]
+    turned = bridged_orientation(recording)[rows]
     path = ScenePath("recorded", platform, "accent", 5)
     attachments = body_attachments(robot, platform, turned if recording.has_orientation else None)
     return RobotScene(recording.time[rows], platform, recording.tension[rows], (path,), attachments=attachments)
+
+
+def bridged_orientation(recording: Recording) -> Array:
+    """Recorded unit quaternions (N, 4), between the samples of a tracker slower than the log too."""
+    return unit_quaternions(bridge_short_gaps(recording.time, recording.orientation))
 
 
 def _curve_data(curve: CheckCurve, points: int) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps, slower_rate
 from ..recordings.weight_balance import ForceBalance, force_balance
 from ..robot.schema import AXES, QUATERNION_COLUMNS, Robot
-from .check_figures import CheckCurve, CheckPanel, panel_data, robot_scene
+from .check_figures import CheckCurve, CheckPanel, bridged_orientation, panel_data, robot_scene
 from .page_rendering import Number, PageHeader, Row, render_page
 from .robot_scene import MAGNIFICATIONS, scene_data
 
@@ -122,7 +122,8 @@ def _length_panels(regression: LengthRegression) -> list[CheckPanel]:
 def _orientation_panels(recording: Recording) -> list[CheckPanel]:
     if not recording.has_orientation:
         return []
-    vectors = 1e3 * rotation_vectors(recording.orientation)
+    vectors = 1e3 * rotation_vectors(bridged_orientation(recording))
+    is_measured = np.isfinite(recording.orientation).all(axis=1)
     return [
         CheckPanel(
             "Rotation",
@@ -130,7 +131,7 @@ def _orientation_panels(recording: Recording) -> list[CheckPanel]:
             "mrad",
             "Time (s)",
             (CheckCurve("recorded", recording.time, angles),),
-            f"rms {format_significant(_rms(angles[np.isfinite(angles)]))} mrad",
+            f"rms {format_significant(_rms(angles[is_measured]))} mrad",
         )
         for axis, angles in zip(AXES, vectors.T, strict=True)
     ]
