@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tautwire.cli import run as command
 from tautwire.cosimulation.robot_wiring import result_columns
@@ -17,6 +18,7 @@ from tautwire.reports.run_overview import RunOverview
 from tautwire.reports.run_page import run_page
 from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
+from tests.support.pose_recordings import quaternions_of, rotation_of
 from tests.support.rigid_robots import suspended_robot
 from tests.support.rigid_runs import made_rigid_run
 from tests.support.robots import EXAMPLES, example
@@ -199,6 +201,30 @@ def test_angular_velocities_are_in_mrad_per_second_and_quaternions_without_a_uni
     (drawn,) = (each for each in channels if (each["title"], each["label"]) == ("Angular velocity", "y"))
     expected = 1e3 * run.overview.rows[:, run.columns.index("wy")]
     assert unpack_float32(drawn["values"]) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("samples", [1601, 4001])
+def test_recorded_orientation_is_drawn_with_the_angle_between_it_and_the_co_simulated_one(samples: int) -> None:
+    """By a tracker slower than the log that writes the other sign; of a long run only each second row is kept."""
+    run = made_rigid_run(suspended_robot(6), samples)
+    parts = [run.columns.index(f"q{part}") for part in "wxyz"]
+    overview, exact = RunOverview(), run.recording.orientation
+    for sample, orientation in enumerate(exact):
+        row = run.overview.last_row.copy()
+        row[parts] = orientation
+        overview.add(float(run.recording.time[sample]), row)
+    turned = rotation_of(exact) * Rotation.from_rotvec((0.0, 0.002, 0.0))
+    slow = np.where(np.arange(samples)[:, None] % 4 != 1, np.nan, -quaternions_of(turned))
+    page = Page(run_page(replace(run, overview=overview, recording=replace(run.recording, orientation=slow)), {}))
+    channels = [each for each in page.data()["choices"][0]["channels"] if each["title"] == "Orientation"]
+    for channel, expected in zip(channels, overview.rows[:, parts].T, strict=True):
+        drawn, angles = (unpack_float32(channel[name]["values"]) for name in ("recorded", "difference"))
+        assert np.isfinite(drawn).mean() > 0.99 and np.nanmin(drawn) == pytest.approx(expected.min(), abs=5e-3)
+        assert channel["difference"]["unit"] == "mrad"
+        assert float(channel["difference"]["apart"]) == pytest.approx(2.0, rel=0.05)
+        assert np.nanmax(np.abs(angles - 2.0)) < 0.5
+    assert page.text.count("Of orientations: the angle between both.") == 2
+    assert "Of orientations" not in Page(run_page(made_run(samples=200), {})).text
 
 
 @pytest.mark.parametrize("robot", [example("cogiro"), suspended_robot(12)], ids=lambda each: each.name)

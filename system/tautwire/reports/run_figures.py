@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cosimulation.robot_wiring import ORIENTATION_AXES
-from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
+from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant, page_unit
+from ..recordings.quaternion_columns import unit_quaternions
 from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import AXES
 from .downsampling import envelope_times, min_max_envelope, pack_float32
@@ -41,7 +42,7 @@ class OutputSeries:
 
     ``scale`` turns SI into ``unit``; values are printed to so many significant ``digits``. ``recorded`` (N,) is over
     the recording's time, None where it has none; ``difference`` (M,) is recorded minus co-simulated at the overview's
-    first M rows, in SI.
+    first M rows, in SI; of each part of a quaternion it is the angle between both orientations.
     """
 
     column_index: int
@@ -60,8 +61,15 @@ class OutputSeries:
         return float(np.sqrt(np.mean(finite**2))) if finite.size else math.nan
 
     @property
+    def is_orientation(self) -> bool:
+        """Whether this is a part of a quaternion."""
+        return self.title == "Orientation"
+
+    @property
     def difference_unit(self) -> tuple[str, float]:
         """The display unit of the difference, and its size in SI units."""
+        if self.is_orientation:
+            return page_unit("rad")
         if self.unit in FIXED_UNITS:
             return self.unit, FIXED_UNITS[self.unit]
         magnitudes = np.abs(self.difference[np.isfinite(self.difference)])
@@ -74,11 +82,12 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
     positions: Mapping[str, Array] = dict(zip(AXES, recording.position.T, strict=True))
     tensions: Mapping[str, Array] = {str(i): recording.tension[:, i - 1] for i in cables}
     speeds: Mapping[str, Array] = {str(i): recording.winch_speed[:, i - 1] for i in cables}
+    orientations, angles = _recorded_orientation(run)
     quantities: tuple[tuple[str, str, Sequence[object], str, float, Mapping[str, Array]], ...] = (
         ("Position", "", AXES, "mm", 1e3, positions),
         ("Tension", "tension_", cables, "N", 1.0, tensions),
         ("Velocity", "v", AXES, "m/s", 1.0, {}),
-        ("Orientation", "q", ORIENTATION_AXES, "", 1.0, {}),
+        ("Orientation", "q", ORIENTATION_AXES, "", 1.0, orientations),
         ("Angular velocity", "w", AXES, "mrad/s", 1e3, {}),
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
@@ -89,8 +98,9 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
             label = f"cable {name}" if names is cables else name
             is_pose = title in ("Position", "Orientation")
             digits = digits_for_range(float(low[index]), float(high[index])) if is_pose else 4
-            compared = _compared(run, index, recorded.get(name))
-            series.append(OutputSeries(index, title, label, unit, scale, digits, *compared))
+            measured, difference = _compared(run, index, recorded.get(name))
+            difference = angles if recorded is orientations and measured is not None else difference
+            series.append(OutputSeries(index, title, label, unit, scale, digits, measured, difference))
     return series
 
 
@@ -109,6 +119,24 @@ def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]
         "magnifications": list(MAGNIFICATIONS),
         "choices": [choice],
     }
+
+
+def _recorded_orientation(run: ReportedRun) -> tuple[Mapping[str, Array], Array]:
+    """Recorded quaternions by their parts, with the signs of the co-simulated ones, and the angles between both, (M,).
+
+    Angles are in rad, at the overview's first M rows.
+    """
+    overview, recording = run.overview, run.recording
+    rows = _columns_by_name(overview.rows, run.column_indices("q", ORIENTATION_AXES), ORIENTATION_AXES)
+    simulated = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    nearest = np.minimum(np.arange(recording.sample_count) // overview.group_size, len(rows) - 1)
+    is_opposite = np.sum(recording.orientation * simulated[nearest], axis=1, keepdims=True) < 0.0
+    recorded = np.where(is_opposite, -recording.orientation, recording.orientation)
+    bridged = unit_quaternions(bridge_short_gaps(recording.time, recorded))[:: overview.group_size]
+    count = min(len(bridged), len(simulated))
+    # By the chord, which is exact for small angles too; both signs of a quaternion are one orientation.
+    chords = [np.linalg.norm(bridged[:count] - sign * simulated[:count], axis=1) for sign in (1.0, -1.0)]
+    return dict(zip(ORIENTATION_AXES, recorded.T, strict=True)), 4.0 * np.arcsin(0.5 * np.minimum(*chords))
 
 
 def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tuple[Array | None, Array]:
@@ -158,6 +186,7 @@ def _difference_data(run: ReportedRun, series: OutputSeries, points: int) -> dic
         "values": pack_float32(min_max_envelope(bridge_short_gaps(time, series.difference) / unit_size, points)),
         "apart": format_significant(series.rms_difference / unit_size),
         "unit": unit,
+        "name": "angle between recorded and co-simulated" if series.is_orientation else "recorded minus co-simulated",
     }
 
 

@@ -18,13 +18,13 @@ function outputPanel(choice, place, isTall) {
     traces.unshift(lineTrace("recorded", time, values, colour.before, { ...hover, ...behind(colour.before) }));
   }
   if (channel.difference && isTall) {
-    const { time, values, apart, unit } = channel.difference;
+    const { time, values, apart, unit, name } = channel.difference;
     const more = { yaxis: "y2", hovertemplate: `%{y:.3~g} ${unit}`, line: { color: colour.text, width: 1 } };
-    traces.push(lineTrace("recorded minus co-simulated", time, values, colour.text, more));
+    traces.push(lineTrace(name, time, values, colour.text, more));
     axes.xaxis.anchor = "y2";
     axes.yaxis.domain = [0.42, 1];
     axes.yaxis2 = axis(colour, unit, { domain: [0, 0.3], nticks: 4, zeroline: true, zerolinecolor: colour["strong-rule"] });
-    words += `; recorded minus co-simulated has a root mean square of ${apart} ${unit}`;
+    words += `; ${name} has a root mean square of ${apart} ${unit}`;
   }
   return { numbers: `${low} to ${high}${unit}`, words: `${words}.`, traces, layout: layout(colour, axes) };
 }
