@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tautwire.paper import write_paper
+from tautwire.fmus.packaging import build_fmus
+from tautwire.paper import paper_reproduction, simulation_records, write_paper
 from tautwire.paper.figure_style import figure_style
 from tautwire.paper.open_claims import elongations_by_reading
 from tautwire.paper.paper_claims import LedgerEntry
@@ -123,8 +125,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def paper(folder: Path) -> PaperReproduction:
-    """All that the command computes and writes."""
-    return write_paper(folder, lambda what, done: None)
+    """All that the command computes and writes; the FMUs are machine code, to be quick."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation_records, "build_fmus", partial(build_fmus, native=True))
+        patch.setattr(paper_reproduction, "processors", lambda: 1)
+        return write_paper(folder, lambda what, done: None)
 
 
 @pytest.fixture(scope="module")
