@@ -29,8 +29,9 @@ from ..robot.active_effects import cable_moduli
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
-from .design import ControlAim, Knot, MarginError, RegulatorDesign, integrated_freedoms, regulator_signals, require_taut
+from .design import ControlAim, Knot, MarginError, RegulatorDesign, regulator_signals, require_taut
 from .gain_scheduling import DESIGN_POINTS, DesignPose, ScheduledController, design_poses
+from .reachable_plant import integrated_coordinates, lowest_frequency, reachable_plant, require_reachable
 from .sampled_plant import ramp_plant
 from .stability_margins import Margins, Range, margins_of
 
@@ -132,8 +133,8 @@ class RobustAim:
 class RobustController(RegulatorDesign):
     """A robust controller with q states, the first of which are integrals of the pose, or of the position alone.
 
-    ``linear`` is the plant in the middle of the range; ``bandwidth``, that of the pose, is a multiple of the lowest
-    mode; ``margins`` are the worst over the range.
+    ``linear`` is what winches reach of the plant in the middle of the range; ``bandwidth``, that of the pose, is a
+    multiple of the lowest mode that stretches a cable; ``margins`` are the worst over the range.
     """
 
     linear: LinearPlant
@@ -154,7 +155,8 @@ def design_robust(
     The default range is :meth:`Range.of` the robot. The ``orientation`` of a rigid platform is a unit quaternion, by
     default that of the robot file.
 
-    Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
+    Raises MarginError where no design does, InputError where a mode that does not decay is out of reach, and what
+    :func:`tautwire.linear.linearise` raises.
     """
     start = robot.platform.start if at is None else at
     (design,) = _fastest_designs(
@@ -192,10 +194,12 @@ def _fastest_designs(
     """Designs of one bandwidth at all poses, the largest at which all have the required margin."""
     robots = [parameter_range.middle(robot), *(each for _, _, each in parameter_range.robots(robot))]
     plants = [
-        [linearise(each, position, orientation=orientation) for each in robots] for position, orientation in poses
+        [reachable_plant(linearise(each, position, orientation=orientation)) for each in robots]
+        for position, orientation in poses
     ]
     for nominal_plant, *_ in plants:
         require_taut(robot, nominal_plant)
+        require_reachable(robot.name, nominal_plant)
     best_margin = 0.0
     for bandwidth in RELATIVE_BANDWIDTHS:
         designs: list[RobustController] = []
@@ -220,8 +224,8 @@ def _design_at(
 ) -> RobustController:
     """A design with its worst margins over some plants, up to the first that falls short."""
     regulator = _shape_regulator(robot, linear, aim.period, bandwidth, robust)
-    share = BACK_CALCULATION_FACTOR * robust.integral * _lowest_frequency(linear) * aim.period
-    tracking = back_calculation(regulator, share, integrated_freedoms(robot.cable_count, linear.degrees_of_freedom))
+    share = BACK_CALCULATION_FACTOR * robust.integral * lowest_frequency(linear) * aim.period
+    tracking = back_calculation(regulator, share, len(integrated_coordinates(linear)))
     knot = Knot(0.0, regulator, tracking)
     worst = margins_of(plants[0], knot)
     for plant in plants[1:]:
@@ -247,27 +251,22 @@ def back_calculation(regulator: Any, share: float, integrated: int) -> Array:
     return gain
 
 
-def _lowest_frequency(linear: LinearPlant) -> float:
-    """Angular frequency of the lowest mode, in rad/s."""
-    return 2.0 * np.pi * float(linear.modes.frequencies[0])
-
-
 def _shape_regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:
     """Regulator of one loop shape: scaled pose and tensions, and winches that respond two samples later."""
     count, freedoms = len(linear.tensions), linear.degrees_of_freedom
-    integrated = integrated_freedoms(count, freedoms)
-    lowest_frequency = _lowest_frequency(linear)
+    frequency = lowest_frequency(linear)
     lengths = np.linalg.norm(np.array(robot.anchors) - linear.position, axis=1)
     stiffness = float(np.mean(np.array(cable_moduli(robot)) * [cable.area for cable in robot.cables] / lengths))
     # A rotation weighs as much as the attachments' displacement by it.
-    speed = bandwidth * lowest_frequency
+    speed = bandwidth * frequency
     pose_weights = np.repeat([speed, speed * platform_size(robot)], [3, freedoms - 3])
-    signal_weights = np.append(pose_weights, np.full(count, robust.damping * lowest_frequency / stiffness))
+    signal_weights = np.append(pose_weights, np.full(count, robust.damping * frequency / stiffness))
     plant = ramp_plant(linear, period)
     scaled = control.ss(plant.A, plant.B, signal_weights[:, None] * plant.C, signal_weights[:, None] * plant.D, period)
     # The pose also by its integral: (s + w) / s.
-    corner, sensors = robust.integral * lowest_frequency, freedoms + count
-    selector = np.eye(sensors, integrated)
+    corner, sensors = robust.integral * frequency, freedoms + count
+    selector = np.eye(sensors)[:, integrated_coordinates(linear)]
+    integrated = selector.shape[1]
     weights = control.ss(np.zeros((integrated, integrated)), corner * selector.T, selector, np.eye(sensors))
     synthesised = synthesise_controller(scaled * _delay_system(count, period), weights)
     return _as_regulator(

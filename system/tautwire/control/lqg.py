@@ -5,7 +5,8 @@
 
 All signals are deviations from the path: ``y`` of pose and tensions, ``w`` of winch speeds; ``a`` are the winch
 accelerations over the next sample. The pose of a rigid platform has rotations behind its position, in rad about the
-axes of the world; on fewer than six cables only the position is integrated, as statics decides the orientation.
+axes of the world; on fewer than six cables only the position is integrated, as statics decides the orientation, and
+in a plane only its coordinates there. Motion across the plane of all cables is no part of the plant.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from numpy.typing import NDArray
 from ..linear import LinearPlant, linearise
 from ..robot.schema import Robot, validate_robot
 from ..validation import validate_instance
-from .design import ControlAim, Knot, integrated_freedoms, measurement_noise, regulator_signals, require_taut
+from .design import ControlAim, Knot, measurement_noise, pose_signals, regulator_signals, require_taut
+from .reachable_plant import integrated_coordinates, reachable_plant, require_reachable, twist_states
 from .sampled_plant import sampled_plant
 
 Array = NDArray[np.float64]
@@ -34,6 +36,7 @@ RICCATI_METHOD = "scipy"
 class Controller:
     """A designed LQG controller; n cables, p states of the plant, d degrees of freedom, of which z are integrated.
 
+    ``linear`` is the linearised plant, what winches reach of it, see :mod:`tautwire.control.reachable_plant`.
     ``plant`` is the sampled ``control.StateSpace`` from winch accelerations to pose, tensions and winch speeds, with
     states (plant, winch speeds). ``feedback`` (n, p + n + z) is K, ``observer`` (p, d + n) is L.
     """
@@ -66,15 +69,15 @@ class Controller:
         correction = self.observer @ self.plant.C[:-count]
         A, B = self.plant.A[:size] - correction, self.plant.B[:size]
         K_state, K_speed, K_sum = np.hsplit(self.feedback, [size, size + count])
-        integrated = K_sum.shape[1]
-        sums = np.eye(integrated, sensors + count)
+        integrated, coordinates = K_sum.shape[1], integrated_coordinates(self.linear)
+        sums = np.eye(sensors + count)[coordinates]
         return control.ss(
             np.block([[A[:, :size] - B @ K_state, -B @ K_sum], [np.zeros((integrated, size)), np.eye(integrated)]]),
             np.vstack([np.hstack([self.observer, A[:, size:] - B @ K_speed]), sums]),
             -np.hstack([K_state, K_sum]),
             -np.hstack([np.zeros((count, sensors)), K_speed]),
             self.aim.period,
-            states=[*self.plant.state_labels[:size], *(f"{name}_error_sum" for name in signals["inputs"][:integrated])],
+            states=[*self.plant.state_labels[:size], *(f"{signals['inputs'][i]}_error_sum" for i in coordinates)],
             **signals,
         )
 
@@ -108,7 +111,8 @@ def design_controller(
     rigid platform is a unit quaternion, by default that of the robot file.
 
     Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold
-    it stably, ArgumentError for an invalid argument. Source: Franklin, Powell and Workman (1998), Digital
+    it stably, InputError where winches do not reach a mode that does not decay, or sensors do not show it,
+    ArgumentError for an invalid argument. Source: Franklin, Powell and Workman (1998), Digital
     Control of Dynamic Systems, chapter 9.
     """
     validate_robot("design_controller: robot", robot)
@@ -117,8 +121,9 @@ def design_controller(
         if aim is None
         else validate_instance("design_controller: aim", aim, ControlAim, "give a ControlAim")
     )
-    linear = linearise(robot, at, orientation=orientation)
+    linear = reachable_plant(linearise(robot, at, orientation=orientation))
     require_taut(robot, linear)
+    require_reachable(robot.name, linear)
     plant = sampled_plant(linear, aim.period)
     return Controller(aim, linear, plant, _feedback_gain(aim, linear, plant), _kalman_gain(robot, aim, linear, plant))
 
@@ -126,19 +131,19 @@ def design_controller(
 def _feedback_gain(aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
     """LQI gain: weighs pose, tensions, winch speeds and summed errors of the pose against winch accelerations."""
     count, freedoms = len(linear.tensions), linear.degrees_of_freedom
-    integrated = integrated_freedoms(count, freedoms)
+    integrated = integrated_coordinates(linear)
     tension = aim.tension * float(np.mean(linear.tensions))
     scales = np.repeat([aim.position, aim.rotation, tension, aim.winch_speed], [3, freedoms - 3, count, count])
     scaled = plant.C / scales[:, None]
     weights = scaled.T @ scaled
     weights = 0.5 * (weights + weights.T)  # python-control wants it symmetric to the last bit
-    sums = np.diag((aim.period / (aim.integral_time * scales[:integrated])) ** 2)
-    zeros = np.zeros((len(weights), integrated))
+    sums = np.diag((aim.period / (aim.integral_time * scales[integrated])) ** 2)
+    zeros = np.zeros((len(weights), len(integrated)))
     gain, _, _ = control.dlqr(
         plant,
         np.block([[weights, zeros], [zeros.T, sums]]),
         np.eye(count) / aim.winch_acceleration**2,
-        integral_action=plant.C[:integrated],
+        integral_action=plant.C[integrated],
         method=RICCATI_METHOD,
     )
     return np.asarray(gain)
@@ -147,13 +152,14 @@ def _feedback_gain(aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
 def _kalman_gain(robot: Robot, aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
     """Stationary Kalman gain: random walks of velocity, rope and effects as process noise, and sensor noise."""
     count, size, freedoms = len(linear.tensions), linear.system.nstates, linear.degrees_of_freedom
-    process_noise = np.repeat(
-        [aim.acceleration_disturbance, aim.angular_acceleration_disturbance, aim.speed_disturbance],
-        [3, freedoms - 3, size - 2 * freedoms],
-    )
+    labels, twist = linear.system.state_labels, twist_states(freedoms)
+    noise = dict.fromkeys(twist[:3], aim.acceleration_disturbance)
+    noise |= dict.fromkeys(twist[3:], aim.angular_acceleration_disturbance)
+    wandering = [index for index, label in enumerate(labels) if label not in pose_signals(freedoms)]
+    process_noise = np.array([noise.get(labels[index], aim.speed_disturbance) for index in wandering])
     gain, _, _ = control.dlqe(
         plant.A[:size, :size],
-        np.eye(size)[:, freedoms:],
+        np.eye(size)[:, wandering],
         plant.C[:-count, :size],
         np.diag(process_noise**2 * aim.period),
         np.diag(measurement_noise(robot, positive=True) ** 2),

@@ -22,6 +22,7 @@ from ..linear import LinearPlant, linearise
 from ..robot.active_effects import cable_moduli
 from ..robot.schema import Robot
 from .design import Knot
+from .reachable_plant import reachable_plant
 from .sampled_plant import ramp_plant
 
 Array = NDArray[np.float64]
@@ -132,11 +133,11 @@ def speed_controller(regulator: Any) -> Any:
 
 
 def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
-    """Margins of a controller on a plant; infinite without feedback, which closes no loop."""
+    """Margins of a controller on what winches reach of a plant; infinite without feedback, which closes no loop."""
     regulator = knot.regulator
     if not np.any(regulator.B[:, : regulator.ninputs - regulator.noutputs]):
         return Margins(0.0, *[float("inf")] * 4)
-    plant, feedback = ramp_plant(linear, regulator.dt), speed_controller(regulator)
+    plant, feedback = ramp_plant(reachable_plant(linear), regulator.dt), speed_controller(regulator)
     radius = float(np.max(np.abs(control.feedback(plant, feedback, 1).poles())))
     if radius >= 1.0:
         return Margins(radius, 0.0, 0.0, 0.0, 0.0)
