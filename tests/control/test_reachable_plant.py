@@ -24,7 +24,7 @@ from tautwire.errors import InputError
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
 from tautwire.robot.trajectory import Line
 from tests.support import rigid_robots
 from tests.support.planar import HORIZONTAL, VERTICAL, Plane, robot_text
@@ -53,6 +53,18 @@ def hung_beam() -> Robot:
     platform = Platform(20.0, (1.8, 0.0, 1.0), inertia=inertia, centre_of_mass=(0.0, 0.0, -0.1))
     ends = (((0.0, 0.0, 3.0), (-0.2, 0.0, 0.1)), ((4.0, 0.0, 3.0), (0.2, 0.0, 0.1)))
     return Robot("beam", 9.81, platform, None, Sensors(), tuple(rigid_robots.cable(*pair) for pair in ends))
+
+
+@pytest.mark.parametrize("anchors", ([(0, 0, 2), (4, 2, 2)], [(0, 0, 2), (3, 3, 2), (2, 2, 0)]), ids=("two", "three"))
+def test_lqg_in_an_oblique_plane_is_stable(anchors: list[tuple[float, float, float]]) -> None:
+    limits = TensionLimits(10.0, 800.0, 80.0) if len(anchors) == 3 else None
+    hung = hung_point(*anchors)
+    x, y, _ = np.array(anchors[0]) + 0.25 * (np.array(anchors[1]) - anchors[0])
+    robot = replace(hung, tension=limits, platform=Platform(5.0, (float(x), float(y), 0.9)))
+    design = design_controller(robot)
+    assert np.abs(control.feedback(design.plant, design.regulator, 1).poles()).max() < 0.99
+    sums = [label for label in design.regulator.state_labels if label.endswith("_sum")]
+    assert sums == ["position_x_error_sum", "position_z_error_sum"]
 
 
 @pytest.fixture(params=("vertical", "horizontal", "two cables", "beam"))

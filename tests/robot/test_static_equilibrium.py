@@ -94,6 +94,24 @@ def test_more_cables_in_one_plane_hold_nothing() -> None:
         static_tensions(flat, np.array([5.0, 4.0, 6.0]))
 
 
+@pytest.mark.parametrize("turn", (0.0, 0.25 * np.pi, 0.5 * np.pi, 2.0))
+@pytest.mark.parametrize("count", (2, 3, 4))
+def test_cables_in_an_upright_plane_hold_what_hangs_in_it(count: int, turn: float) -> None:
+    along = np.array([np.cos(turn), np.sin(turn), 0.0])
+    points = [(-1.5, 3.0), (2.0, 3.0), (0.2, 0.0), (1.0, 3.5)][:count]
+    anchors = [tuple((s * along + [0.0, 0.0, z]).tolist()) for s, z in points]
+    three = example("three")
+    cables = tuple(replace(three.cables[0], anchor=anchor) for anchor in anchors)
+    limits = TensionLimits(1.0, 1e5, 500.0) if count > 2 else None
+    robot = replace(three, cables=cables, tension=limits)
+    place = 0.3 * along + np.array([0.0, 0.0, 1.5])
+    tensions = static_tensions(robot, place)
+    spans = np.array(anchors) - place
+    force = tensions @ (spans / np.linalg.norm(spans, axis=1)[:, None])
+    assert force == pytest.approx([0.0, 0.0, robot.platform.mass * robot.gravity], abs=1e-3)
+    assert tensions.min() >= (0.0 if limits is None else 1.0 - 1e-6)
+
+
 @pytest.mark.parametrize("tension", [None, TensionLimits(100.0, 4000.0, 600.0), TensionLimits(300.0, 1000.0, 400.0)])
 def test_tensions_are_continuous_along_a_path(tension: TensionLimits | None) -> None:
     robot = replace(example("eight"), tension=tension)

@@ -40,7 +40,9 @@ def static_tensions(robot: Robot, at: Array | None = None, rule: str = "nearest"
     routes = cable_routes(REAL, robot, position.tolist())
     direction_matrix = np.array([route.direction for route in routes]).T
     load_vector = np.array(static_load(REAL, robot, position.tolist()), dtype=float)
-    solver = _solve_three if len(robot.cables) == 3 else partial(_distribute, rule=rule)
+    # Three cables in one plane hold a load in it, if at all, by many tensions.
+    is_determinate = len(routes) == 3 and abs(np.linalg.det(direction_matrix)) >= SINGULARITY_TOLERANCE
+    solver = _solve_three if is_determinate else partial(_distribute, rule=rule)
     if not cables_have_weight(robot):
         return solver(robot, position, direction_matrix, load_vector)
 
@@ -95,8 +97,6 @@ def static_forces(robot: Robot) -> Array:
 
 
 def _solve_three(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
-    if abs(np.linalg.det(direction_matrix)) < SINGULARITY_TOLERANCE:
-        raise unreachable_error(robot, position, "the three cables lie in one plane there")
     tensions = np.asarray(np.linalg.solve(direction_matrix, load), dtype=np.float64)
     worst = int(np.argmin(tensions))
     if tensions[worst] < 0.0:

@@ -19,6 +19,7 @@ from .schema import TensionLimits
 Array = NDArray[np.float64]
 
 BALANCE_TOLERANCE = 1e-6
+RANK_TOLERANCE = 1e-9
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 RULES = ("nearest", "least_norm", "barycentre", "closed_form")
 
@@ -50,7 +51,20 @@ def distribute_tensions(
     tensions: Array = np.asarray(solution["x"], dtype=float).ravel() * scale
     # The solver ignores a row of zeros, as with cables in one plane.
     is_balanced = np.linalg.norm(unit_directions @ tensions - load) <= BALANCE_TOLERANCE * scale
-    return tensions if solver.stats()["success"] and is_balanced else None
+    if solver.stats()["success"] and is_balanced:
+        return tensions
+    # Nor does it solve dependent rows, as with cables in a plane that is oblique to the axes.
+    span, _ = _row_span(unit_directions)
+    if span.shape[1] == len(load) or np.linalg.norm(load - span @ (span.T @ load)) > BALANCE_TOLERANCE * scale:
+        return None
+    return distribute_tensions(span.T @ unit_directions, span.T @ load, limits, preferred)
+
+
+def _row_span(unit_directions: Array) -> tuple[Array, Array]:
+    """Orthonormal basis (3, r) of the forces that cables can exert, and the singular values (r,) that belong to it."""
+    left_vectors, singular_values, _ = np.linalg.svd(unit_directions, full_matrices=False)
+    spanned = singular_values > RANK_TOLERANCE * singular_values[0]
+    return left_vectors[:, spanned], singular_values[spanned]
 
 
 def least_limit_violations(unit_directions: Array, load: Array, limits: TensionLimits) -> Array:
@@ -61,10 +75,9 @@ def least_limit_violations(unit_directions: Array, load: Array, limits: TensionL
     cables cannot exert the load at all, such as cables in one plane.
     """
     scale = max(float(np.linalg.norm(load)), 1.0)
-    left_vectors, singular_values, _ = np.linalg.svd(unit_directions, full_matrices=False)
-    spanned = singular_values > 1e-9 * singular_values[0]
-    rows = (left_vectors[:, spanned] / singular_values[spanned]).T
-    unreachable_load = load - left_vectors[:, spanned] @ (left_vectors[:, spanned].T @ load)
+    span, singular_values = _row_span(unit_directions)
+    rows = (span / singular_values).T
+    unreachable_load = load - span @ (span.T @ load)
     if np.linalg.norm(unreachable_load) > 1e-9 * scale:
         return np.full(unit_directions.shape[1], np.nan)
     solution = lsq_linear(
