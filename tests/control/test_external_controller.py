@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,6 +19,7 @@ from tautwire.control import (
     ClosedLoopOptions,
     ControlAim,
     ControllerError,
+    Feedforward,
     build_controller_fmu,
     cosimulate_closed_loop,
     design_controller,
@@ -30,7 +32,7 @@ from tautwire.control import (
 )
 from tautwire.control.controller_fmu import ControllerFmu, ControllerFmuError, Sample
 from tautwire.control.design import measurement_noise
-from tautwire.cosimulation.robot_cosimulation import CosimulationResult
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, RunError
 from tautwire.errors import ArgumentError
 from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
@@ -281,6 +283,28 @@ def test_an_fmu_matched_for_another_platform_is_refused(fmus: RobotFmus, tmp_pat
     of_turning = fmu_controller(lqg_fmu(tmp_path), 3, is_rigid=True)
     with pytest.raises(ControllerFmuError, match=r"another platform; match it by fmu_controller\(path, 3, is_r"):
         closed_loop(fmus, of_turning)
+
+
+def test_an_fmu_runs_at_the_period_that_it_states(tmp_path: Path) -> None:
+    slow = Feedforward(3, ControlAim(period=0.02))
+    ours = build_controller_fmu(ROBOT, slow, PATH, 1.0, tmp_path)
+    assert fmu_controller(ours, 3).aim.period == 0.02
+    assert fmu_controller(ours, 3, ControlAim(period=0.02)).aim.period == 0.02
+    with pytest.raises(ControllerFmuError, match=r"samples every 0\.02 s, aim\.period is 0\.01 s"):
+        fmu_controller(ours, 3, ControlAim(period=0.01))
+    assert fmu_controller(lqg_fmu(tmp_path), 3).aim.period == ControlAim().period
+
+
+def leaving(time: float, measured: Array) -> Array:
+    if time > 0.095:
+        os._exit(3)
+    return np.zeros(3)
+
+
+def test_a_controller_that_ends_the_process_is_named_and_the_run_until_then_kept(fmus: RobotFmus) -> None:
+    with pytest.raises(RunError, match=r"exit status 3 in the controller leaving at 0\.11 s: call it alone") as caught:
+        closed_loop(fmus, leaving, patience=30.0)
+    assert caught.value.result.time == pytest.approx(np.arange(12) * 0.01)
 
 
 def test_a_sensor_that_is_declared_without_noise_has_none() -> None:

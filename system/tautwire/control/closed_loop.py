@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..array_validation import validate_array, validate_increasing
 from ..cosimulation import Connection, Experiment, FixedStep, InputSource, Port, Progress
+from ..cosimulation.isolation import RunAbortedError
 from ..cosimulation.robot_cosimulation import (
     DEFAULT_STEP,
     NO_ADDITIONAL_COMPONENTS,
     TIME_MEANING,
     AdditionalComponents,
     CosimulationResult,
+    RunError,
     run_cosimulation,
     wire_fmus,
 )
@@ -106,10 +108,11 @@ def cosimulate_closed_loop(
     ``robot`` is the controller's model. Returns the run at the controller's samples. With winches the controller's
     speeds are their commands.
 
-    Raises ControllerError where a function fails, UnreachableError where the path requires a cable to push,
-    StretchError where no speeds follow it, RunError where an FMU fails, ControllerFmuError where a controller FMU does
-    not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not match, SlotError
-    where a load is on a user's platform without an input for it, ArgumentError for an invalid argument.
+    Raises ControllerError where a function raises, UnreachableError where the path requires a cable to push,
+    StretchError where no speeds follow it, RunError where an FMU fails or a controller hangs, ControllerFmuError where
+    a controller FMU does not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not
+    match, SlotError where a load is on a user's platform without an input for it, ArgumentError for an invalid
+    argument.
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)
@@ -132,7 +135,10 @@ def cosimulate_closed_loop(
             path_controller, wiring.output_indices, len(wiring.outputs) + len(wiring.missing_columns)
         )
         extra = AdditionalComponents(external_inputs=ports) if loads else NO_ADDITIONAL_COMPONENTS
-        return _run(fmus, JoinedSources((source, *loads)) if loads else source, times, options, extra)
+        try:
+            return _run(fmus, JoinedSources((source, *loads)) if loads else source, times, options, extra)
+        except RunError as error:
+            raise _with_controller_named(error, controller) from error.cause
 
 
 def build_controller_fmu(
@@ -248,6 +254,15 @@ def _run(
 ) -> CosimulationResult:
     experiment = Experiment(source, times, FixedStep(options.step))
     return run_cosimulation(fmus, experiment, options.progress, options.patience, extra)
+
+
+def _with_controller_named(error: RunError, controller: Design) -> RunError:
+    """The error of a run, which names a controller that hung or ended the process."""
+    cause = error.cause
+    if not (isinstance(cause, RunAbortedError) and isinstance(controller, SpeedController)):
+        return error
+    where, hint = f"in the controller {controller.origin}", "call it alone"
+    return RunError(RunAbortedError(cause.status, cause.time, where, hint), error.result)
 
 
 def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from fmpy.model_description import ScalarVariable
+from fmpy.model_description import ModelDescription, ScalarVariable
 from numpy.typing import NDArray
 
 from ..cosimulation.robot_wiring import ORIENTATION_AXES
@@ -45,6 +45,8 @@ class Sample(NamedTuple):
 class ControllerFmu:
     """A controller FMU; ``inputs`` and ``outputs`` are its matched variables with the robot's signals.
 
+    ``period`` is the sample period in s that it states, None where it states none.
+
     It is loaded at its first sample: a run in a worker process loads it there.
 
     Raises ControllerFmuError where a variable does not match, ArchiveError where the file is not an FMU.
@@ -57,6 +59,7 @@ class ControllerFmu:
             problem = f"it is FMI {description.fmiVersion}, or not for co-simulation"
             raise ControllerFmuError(path, None, problem, "export it as FMI 2.0 or 3.0 co-simulation")
         variables: list[ScalarVariable] = description.modelVariables
+        self.period = _stated_period(description)
         self._signals = _input_signals(cable_count, is_rigid)
         self.inputs = _matched(path, variables, "input", self._signals)
         speeds, rates = (_numbered(name, cable_count) for name in ("winch_speed", "winch_acceleration"))
@@ -99,6 +102,16 @@ class ControllerFmu:
     def _load(self) -> tuple[Component, VariableBlock, VariableBlock]:
         component = Component("controller", self.path)
         return component, component.block(list(self.inputs)), component.block(self._output_names)
+
+
+def _stated_period(description: ModelDescription) -> float | None:
+    """The sample period in s by a parameter ``period``, or by the step size of an FMU that takes no other step."""
+    for variable in description.modelVariables:
+        if variable.name == "period" and variable.causality in ("parameter", "calculatedParameter") and variable.start:
+            return float(variable.start)
+    takes_other_steps = description.coSimulation.canHandleVariableCommunicationStepSize
+    step = None if description.defaultExperiment is None else description.defaultExperiment.stepSize
+    return None if takes_other_steps or not step else float(step)
 
 
 def _initialize(component: Component, inputs: VariableBlock) -> None:

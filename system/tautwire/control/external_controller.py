@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from ..name_suggestions import suggest_name
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from ..validation import validate_file, validate_instance
-from .controller_fmu import ControllerFmu, Sample
+from .controller_fmu import ControllerFmu, ControllerFmuError, Sample
 from .design import ControlAim, Design, Feedforward, RegulatorDesign, regulator_signals
 from .feedforward import Reference
 from .path_controller import PathController
@@ -55,6 +56,13 @@ class SpeedController(Feedforward):
     """Winch speeds (n,) from a sample by ``speeds_from``, in place of those of a reference."""
 
     speeds_from: SpeedLaw | ControllerFmu | None = None
+
+    @property
+    def origin(self) -> str:
+        """What computes the speeds, for messages: the file of an FMU, or the name of a function."""
+        if isinstance(self.speeds_from, ControllerFmu):
+            return str(self.speeds_from.path)
+        return str(getattr(self.speeds_from, "__qualname__", describe_value(self.speeds_from)))
 
     @property
     def uses_feedback(self) -> bool:
@@ -129,6 +137,9 @@ def fmu_controller(
 ) -> SpeedController:
     """Sampled-data controller from a co-simulation FMU, FMI 2.0 or 3.0, stepped by ``aim.period``.
 
+    Without ``aim`` the period is what the FMU states: the start of its parameter ``period``, or the step size of an FMU
+    that takes no other step. That is then the only period that an ``aim`` may have.
+
     Its inputs, by name, are measured, ``position_x`` and ``tension_i``, of a platform that ``is_rigid`` also
     ``orientation_w`` to ``orientation_z``, or expected on the path, with ``reference_`` before these names;
     ``reference_winch_speed_i`` are the path's speeds when the demanded ones are reached. Outputs ``winch_speed_i``
@@ -136,10 +147,17 @@ def fmu_controller(
     do not matter: ``position.x`` and ``Tension[1]`` are such names too. ``speeds_from.inputs`` and
     ``speeds_from.outputs`` of the result are the matched variables with their signals.
 
-    Raises ControllerFmuError where a variable does not match, ArchiveError where the file is not an FMU.
+    Raises ControllerFmuError where a variable or the period does not match, ArchiveError where the file is not an FMU.
     """
     file = validate_file("fmu_controller: path", path)
-    return SpeedController(cable_count, _without_tare(aim), ControllerFmu(file, cable_count, is_rigid))
+    controller = ControllerFmu(file, cable_count, is_rigid)
+    period = controller.period
+    if aim is None and period is not None:
+        aim = ControlAim(period=period)
+    elif aim is not None and period is not None and not isclose(aim.period, period, rel_tol=1e-9):
+        problem = f"it is made for samples every {period:g} s, aim.period is {aim.period:g} s"
+        raise ControllerFmuError(file, None, problem, f"give ControlAim(period={period:g})")
+    return SpeedController(cable_count, _without_tare(aim), controller)
 
 
 def designed(where: str, controller: object, robot: Robot, aim: ControlAim | None, discretisation: str) -> Design | Any:

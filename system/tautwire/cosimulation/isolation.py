@@ -155,12 +155,15 @@ class CallAbortedError(ComponentError):
 
 
 class RunAbortedError(TautwireError):
-    """A run hung, or its process ended, while no FMU was being called; carries how, and the time (s)."""
+    """A run hung, or its process ended, while no FMU was being called; carries how, the time (s), and ``where``."""
 
-    def __init__(self, status: str, time: float) -> None:
+    def __init__(
+        self, status: str, time: float, where: str = "outside any FMU", hint: str = "check its external inputs"
+    ) -> None:
         self.status = status
         self.time = time
-        super().__init__(f"the run {status} outside any FMU at {time:.6g} s: check its external inputs")
+        self.where = where
+        super().__init__(f"the run {status} {where} at {time:.6g} s: {hint}")
 
 
 class RemoteTracebackError(Exception):
