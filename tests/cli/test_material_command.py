@@ -84,9 +84,12 @@ def test_trace_takes_a_dynamic_test_for_a_recording(tmp_path: Path) -> None:
     assert (tmp_path / "cable_1.fmu").exists()
 
 
-def test_a_dynamic_test_needs_no_check_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("option", [("--check", str(PAPER_TABLE)), ("--time-limit", "60")])
+def test_a_dynamic_test_needs_no_check_recording_and_no_time_limit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], option: tuple[str, str]
+) -> None:
     out = tmp_path / "out"
-    status = run(["trace", str(ROBOT), str(PAPER_TABLE), "--check", str(PAPER_TABLE), "--out", str(out)])
-    assert status == 2
-    assert "omit it" in capsys.readouterr().err
+    assert run(["trace", str(ROBOT), str(PAPER_TABLE), *option, "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert f"{option[0]}: " in said and "omit it" in said
     assert not out.exists()

@@ -14,13 +14,13 @@ from tautwire.errors import InputError
 from tautwire.fmus.fmu_slots import (
     SlotError,
     check_user_fmus,
-    notes_on_unstated_units,
+    notes_on_user_fmus,
     parse_user_fmus,
     require_step_support,
     slot_ports,
 )
 from tautwire.fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
-from tautwire.robot.schema import UserFmu, fmu_slots
+from tautwire.robot.schema import EffectSetting, Formula, UserFmu, fmu_slots
 from tests.support.own_fmus import falling_mass, packed, packed_3
 from tests.support.robots import paper_robot
 
@@ -97,10 +97,22 @@ def test_so_is_one_of_an_fmi_3_fmu(tmp_path: Path, change: Mapping[str, str], po
     assert not [word for word in words if word not in str(error)], str(error)
 
 
+def test_effects_of_what_an_fmu_replaces_are_told(tmp_path: Path) -> None:
+    own = tuple(UserFmu(slot, packed_3(tmp_path / f"{slot}.fmu", b"")) for slot in ("winch_2", "cable_2", "platform"))
+    gain, drag = EffectSetting("sensor_gain", {"tension_gain": 1.1}, (2,)), EffectSetting("drag", {"linear": 5.0}, ())
+    settings = (gain, drag, EffectSetting("damping", {"damping": 1e8}, (1, 2)))
+    formulas = (Formula("force_x", "-20*vx", ()),)
+    notes = notes_on_user_fmus(replace(paper_robot(), fmus=own, effects=settings, formulas=formulas))
+    assert [note for note in notes if "effects" in note] == [
+        f"{own[1].path}: effects of the robot file do not act in a user's FMU: sensor_gain, damping",
+        f"{own[2].path}: effects of the robot file do not act in a user's FMU: drag, formula",
+    ]
+
+
 def test_an_fmi_3_fmu_fits(tmp_path: Path) -> None:
     own = UserFmu("winch_2", packed_3(tmp_path / "a.fmu", b""))
     check_user_fmus(replace(paper_robot(), fmus=(own,)))
-    assert notes_on_unstated_units(replace(paper_robot(), fmus=(own,))) == ()
+    assert notes_on_user_fmus(replace(paper_robot(), fmus=(own,))) == ()
     require_step_support({"winch_2": own.path}, adaptive=True, equidistant=False)
     fixed = packed_3(tmp_path / "b.fmu", b"", {'canGetAndSetFMUState="true"': ""})
     with pytest.raises(SlotError, match="cannot save its state"):

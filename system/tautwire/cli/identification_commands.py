@@ -167,7 +167,10 @@ def trace(
         Path | None, typer.Option(metavar="TRACKER.csv", help="The tracker's file of the recording for validation.")
     ] = None,
     alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
-    time_limit: Annotated[float, typer.Option(metavar="SECONDS", help="Time for the best answer.", min=1.0)] = 600.0,
+    time_limit: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Time for the best answer; 600 s by default.", min=1.0),
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -193,11 +196,14 @@ def trace(
     validated_false_alarm_rate("--alpha", alpha)
     if check_tracker is not None and check is None:
         raise InputError("--check-tracker", "is given without --check", "name the winches' log of the same motion")
-    limit = TimeLimit(time_limit)
+    limit = TimeLimit() if time_limit is None else TimeLimit(time_limit)
     output = CommandOutput(as_json, quiet)
     if columns is None and tracker is None and is_material_table(fit):
+        problem = f"{fit} is a dynamic test of a rope"
         if check is not None:
-            raise InputError("--check", f"{fit} is a dynamic test of a rope", "omit it: its rows are cross-validated")
+            raise InputError("--check", problem, "omit it: its rows are cross-validated")
+        if time_limit is not None:
+            raise InputError("--time-limit", problem, "omit it: the rope is fitted completely")
         judge_rope_material(context, fit, robot_file, out, alpha, output)
         return
     robot = with_columns(read_plausible_robot(robot_file), columns)
@@ -213,7 +219,7 @@ def trace(
         own_temporary_folder() as temporary,
         atomic_folder(out) as scratch,
         exit_on_overdue_interrupt(lambda: _end_interrupted(temporary, scratch)),
-        progress_bar(output, time_limit) as progress,
+        progress_bar(output, limit.seconds) as progress,
     ):
         trace_result = traced(robot, recording, check_recording, progress, alpha, processors(), limit)
         progress("writing the report", 0.0)

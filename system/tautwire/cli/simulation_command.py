@@ -216,11 +216,11 @@ def _add_rows(result: ResultFile, motion: CosimulationResult) -> None:
 def _closed_loop_notes(robot: Robot, motion: CosimulationResult) -> tuple[str, ...]:
     """Notes on a run with a controller: on units, columns, and what the FMUs lack."""
     from ..cosimulation.recording_simulation import missing_column_notes
-    from ..fmus.fmu_slots import notes_on_unstated_units
+    from ..fmus.fmu_slots import notes_on_user_fmus
 
     missing = missing_column_notes(motion.missing_columns)
     statistics = motion.statistics
-    return (*notes_on_unstated_units(robot), *missing, *statistics.fallback_notes(), *statistics.warnings())
+    return (*notes_on_user_fmus(robot), *missing, *statistics.fallback_notes(), *statistics.warnings())
 
 
 def _result_columns(robot: Robot) -> list[Column]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..fmus.fmu_slots import notes_on_unstated_units
+from ..fmus.fmu_slots import notes_on_user_fmus
 from ..fmus.packaging import RobotFmus, build_fmus
 from ..recordings.recording import Recording, read_recording
 from ..recordings.start_position import start_pose, with_start
@@ -101,7 +101,7 @@ def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -
     inputs = PiecewiseLinearInput(recording.time[:count], recording.winch_speed[:count])
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
-    notes = (*recording.notes, *notes, *notes_on_unstated_units(robot))
+    notes = (*recording.notes, *notes, *notes_on_user_fmus(robot))
     started = with_true_start(with_measured_start(robot, start.position))
     return RecordedInputs(started, inputs, (*notes, *orientation_notes(started)))
 

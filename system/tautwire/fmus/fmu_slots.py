@@ -12,6 +12,7 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 from tautwire_fmu.units import UNITS
 
 from ..errors import InputError, format_value
+from ..robot.active_effects import attachment_settings, cable_settings, platform_settings, shifts_position
 from ..robot.schema import AXES, Robot, UserFmu, fmu_slots
 from .component import INSTANCE_TYPES
 from .fmi_binding import is_real_scalar, type_name
@@ -135,10 +136,13 @@ def missing_user_fmu_ports(user_fmus: Mapping[str, Path], cable_count: int, is_r
     return frozenset(missing)
 
 
-def notes_on_unstated_units(robot: Robot) -> tuple[str, ...]:
-    """Notes on user FMUs whose ports state no units."""
+def notes_on_user_fmus(robot: Robot) -> tuple[str, ...]:
+    """Notes on user FMUs whose ports state no units, or that lack effects which ours would have."""
     notes = []
     for user_fmu in robot.fmus:
+        effects = dict.fromkeys(_effects_of_slot(robot, user_fmu.slot))
+        if effects:
+            notes.append(f"{user_fmu.path}: effects of the robot file do not act in a user's FMU: {', '.join(effects)}")
         variables = {variable.name: variable for variable in _runnable_description(user_fmu).modelVariables}
         ports_without_unit = [port for port in _robot_slot_ports(robot, user_fmu.slot) if port.name in variables]
         ports_without_unit = [port for port in ports_without_unit if unit_of(variables[port.name]) is None]
@@ -149,6 +153,20 @@ def notes_on_unstated_units(robot: Robot) -> tuple[str, ...]:
                 f"{first}"
             )
     return tuple(notes)
+
+
+def _effects_of_slot(robot: Robot, slot: str) -> list[str]:
+    """Names of the effects, and the word formula, that the FMU of a slot would have."""
+    kind, _, number = slot.partition("_")
+    if kind == "winch":
+        return []
+    if kind == "cable":
+        formulas, settings = robot.formulas_on(int(number)), list(cable_settings(robot, int(number)))
+    else:
+        formulas = robot.formulas_on()
+        settings = [each for each in platform_settings(robot) if not each.cables or shifts_position(each)]
+        settings += [each for cable in robot.cable_numbers for each in attachment_settings(robot, cable)]
+    return [*(setting.name for setting in settings), *(["formula"] if formulas else [])]
 
 
 def require_step_support(user_fmus: Mapping[str, Path], adaptive: bool, equidistant: bool) -> None:
