@@ -190,9 +190,15 @@ def test_paths_and_controllers_multiply_the_samples(tmp_path: Path) -> None:
 def test_plans_that_make_other_rows_have_other_digests_wherever_they_stand(tmp_path: Path) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "b").mkdir()
-    here = read(tmp_path / "a", AT_REST)
+    here, digests = read(tmp_path / "a", AT_REST), []
     assert here.digest() == read(tmp_path / "b", AT_REST).digest()
     assert here.digest() != read(tmp_path / "a", AT_REST.replace("seed = 7", "seed = 8")).digest()
+    for content in (b"first", b"second"):
+        (tmp_path / "a" / "mine.fmu").write_bytes(content)
+        with_fmu = tmp_path / "a" / "robot.toml"
+        with_fmu.write_text((EXAMPLES / "three" / "robot.toml").read_text() + '\n[fmu]\nwinch_1 = "mine.fmu"\n')
+        digests.append(read_plan(tmp_path / "a" / "plan.toml").digest())
+    assert digests[0] != digests[1]
     robot = tmp_path / "b" / "robot.toml"
     robot.write_text(robot.read_text(encoding="utf-8").replace("mass = 300.0", "mass = 301.0"), encoding="utf-8")
     assert here.digest() != read_plan(tmp_path / "b" / "plan.toml").digest()

@@ -208,7 +208,7 @@ class TracePlan:
 class Plan:
     """A campaign plan: ``content`` of the robot file ``file``; each of ``count`` samples has values of all inputs.
 
-    With a ``trace`` each recording is a run, and nothing varies.
+    With a ``trace`` each recording is a run, and nothing varies. ``fmu_digests`` are those of the robot's user FMUs.
     """
 
     file: str
@@ -224,6 +224,7 @@ class Plan:
     compute: Compute = Compute()
     trace: TracePlan | None = None
     notes: tuple[str, ...] = ()
+    fmu_digests: tuple[str, ...] = ()
 
     @property
     def variants(self) -> tuple[tuple[int, str], ...]:

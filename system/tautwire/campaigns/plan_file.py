@@ -129,6 +129,7 @@ def read_plan(path: str | Path) -> Plan:
         belief=choice(table, "believes", BELIEFS) or BELIEFS[0],
         compute=_read_compute(table),
         notes=identified.notes,
+        fmu_digests=tuple(file_digest(fmu.path) for fmu in robot.fmus),
     )
     if method == "saltelli":
         if plan.correlations and len(set(correlated_groups(plan))) == 1:
