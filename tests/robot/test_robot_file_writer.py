@@ -27,7 +27,7 @@ from tautwire.robot.schema import (
     fmu_slots,
 )
 from tautwire_fmu.laws.cable import LAWS
-from tautwire_fmu.laws.effects import ALL
+from tautwire_fmu.laws.effects import ALL, Effect, Parameter
 from tests.support.robots import example
 
 HALL = Robot(
@@ -131,24 +131,31 @@ FILES = st.text(st.characters(exclude_categories=("C", "Z"), exclude_characters=
 NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=20)
 
 
+def values_of(effect: Effect, moves_tracker: bool = True) -> st.SearchStrategy[dict[str, float]]:
+    """Values that leave the platform a mass; one setting alone of an effect may move the tracker."""
+
+    def value(parameter: Parameter) -> st.SearchStrategy[float | None]:
+        if parameter.needs_rigid_body or (parameter.name.startswith("position_") and not moves_tracker):
+            return st.just(parameter.neutral)
+        minimum = 0.0 if effect.name == "payload" else parameter.minimum
+        return st.floats(minimum, parameter.maximum)
+
+    return st.fixed_dictionaries({parameter.name: value(parameter) for parameter in effect.parameters})
+
+
 @st.composite
 def effect_settings(draw: st.DrawFn, cable_count: int) -> list[EffectSetting]:
     """Settings as files of point masses may hold them: each effect at most once for each cable."""
-    drawn = []
+    drawn: list[EffectSetting] = []
     of_point_masses = [effect for effect in ALL if not effect.needs_rigid_body]
     for effect in draw(st.lists(st.sampled_from(of_point_masses), unique=True, max_size=3)):
-        numbers = st.fixed_dictionaries(
-            {
-                p.name: st.just(p.neutral) if p.needs_rigid_body else st.floats(p.minimum, p.maximum)
-                for p in effect.parameters
-            }
-        )
         if effect.component not in PER_CABLE_COMPONENTS:
-            drawn.append(EffectSetting(effect.name, draw(numbers)))
+            drawn.append(EffectSetting(effect.name, draw(values_of(effect))))
             continue
         shares = draw(st.lists(st.integers(0, 2), min_size=cable_count, max_size=cable_count))
         groups = [tuple(i for i, share in enumerate(shares, 1) if share == group) for group in (1, 2)]
-        drawn += [EffectSetting(effect.name, draw(numbers), group) for group in groups if group]
+        for number, group in enumerate(group for group in groups if group):
+            drawn.append(EffectSetting(effect.name, draw(values_of(effect, number == 0)), group))
     return draw(st.permutations(drawn))
 
 
