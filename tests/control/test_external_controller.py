@@ -292,7 +292,21 @@ def test_an_fmu_runs_at_the_period_that_it_states(tmp_path: Path) -> None:
     assert fmu_controller(ours, 3, ControlAim(period=0.02)).aim.period == 0.02
     with pytest.raises(ControllerFmuError, match=r"samples every 0\.02 s, aim\.period is 0\.01 s"):
         fmu_controller(ours, 3, ControlAim(period=0.01))
-    assert fmu_controller(lqg_fmu(tmp_path), 3).aim.period == ControlAim().period
+    slow = Feedforward(3, ControlAim(period=1.0 / 120.0))
+    file = build_controller_fmu(ROBOT, slow, PATH, 1.0, tmp_path)
+    with pytest.raises(ControllerFmuError, match=r"give ControlAim\(period=0\.008333333333333333\)"):
+        fmu_controller(file, 3, ControlAim(period=0.01))
+
+
+def test_a_period_of_other_tools_is_a_parameter_like_others(tmp_path: Path) -> None:
+    variable = 'Real("period", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)'
+    lines = "\n        ".join(("self.period = 2.0", f"self.register_variable({variable})", "self.state = [0.0]"))
+    file = lqg_fmu(
+        tmp_path,
+        script=SLAVE.replace("self.state = [0.0]", lines, 1).replace("Fmi2Slave,", "Fmi2Slave, Fmi2Variability,"),
+    )
+    assert fmu_controller(file, 3).aim.period == ControlAim().period
+    assert fmu_controller(file, 3, ControlAim(period=0.02)).aim.period == 0.02
 
 
 def leaving(time: float, measured: Array) -> Array:

@@ -17,8 +17,9 @@ from tautwire.control import (
     sample_times,
     schedule_controller,
 )
+from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.trajectory import PAPER_HELIX, Line
 from tests.support.robots import example
 
@@ -65,6 +66,13 @@ def test_designs_are_made_for_the_places_of_the_path(three: Robot) -> None:
     middle, last = (knot.regulator for knot in scheduled.knots()[1:])
     assert np.array_equal(middle.A, there.A) and np.array_equal(middle.C, there.C)
     assert np.max(np.abs(last.C - middle.C)) > 0.02 * np.max(np.abs(middle.C))
+
+
+def test_designs_of_different_states_are_not_interpolated(three: Robot) -> None:
+    relaxing = three.with_effect(EffectSetting("relaxation", {"modulus": 2e10, "time": 1.0}, (1, 2, 3)))
+    designs = (design_controller(three), design_controller(relaxing))
+    with pytest.raises(InputError, match="reach other states or coordinates at 1 s than at 0 s"):
+        ScheduledController((0.0, 1.0), designs)
 
 
 def test_one_design_takes_over_from_the_next_without_a_bump(three: Robot) -> None:

@@ -71,6 +71,8 @@ def test_residual_is_the_swing_of_a_mode_after_the_last_impulse(kind: ShaperKind
 def test_a_mode_that_does_not_swing_gets_no_impulses() -> None:
     with pytest.raises(InputError, match=r"damping_ratio: is 1\.2, with which no mode swings"):
         shaper(1.2, 1.2)
+    with pytest.raises(InputError, match="'foo' is not a known shaper"):
+        shaper_for_modes(np.zeros(0), np.zeros(0), cast(ShaperKind, "foo"))
     robot = replace(paper_robot(), cables=tuple(replace(each, damping=1e13) for each in paper_robot().cables))
     path = shape_along(robot, PATH, points=3)
     assert isinstance(path, ShapedTrajectory)

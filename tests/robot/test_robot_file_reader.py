@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RobotFileError
-from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_reader import read_robot, read_robot_with_sink
 from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits, UserFmu, Winch
 
 HALL = """\
@@ -221,6 +221,13 @@ def test_refuses_a_wrong_effect(tmp_path: Path, effect: str, key: str, words: li
     error = refused(tmp_path, f"{HALL}\n{effect}\n")
     assert key_of(error) == key
     assert not [word for word in words if word not in str(error)], str(error)
+
+
+def test_a_mass_that_is_no_number_is_one_error(tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(f'{HALL}\n[effect.payload]\nmass = "heavy"\n')
+    errors: list[RobotFileError] = []
+    read_robot_with_sink(tmp_path / "robot.toml", errors.append)
+    assert [key_of(error) for error in errors] == ["effect.payload.mass"]
 
 
 @pytest.mark.parametrize(

@@ -138,15 +138,14 @@ def fold_constant_effects(
     Any other cable is returned as it is."""
     if not effects or not all(active.effect.only_sets_constants for active in effects):
         return cable, effects
-    return _with_effective_constants(m, cable, effects, [()] * len(effects)), ()
+    return _with_effective_constants(m, cable, effects), ()
 
 
-def _with_effective_constants(
-    m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect], states: Sequence[Tuple[Any, ...]]
-) -> CableConstants:
-    """The cable with the modulus and damping that effects give it."""
-    modulus, _ = stages.stiffness(m, effects, states, cable)
-    return cable._replace(modulus=modulus, damping=stages.viscosity(m, effects, cable))
+def _with_effective_constants(m: Mathematics, cable: CableConstants, effects: Sequence[ActiveEffect]) -> CableConstants:
+    """The cable with the modulus and damping that effects set; with a relaxation the modulus is the long-term one."""
+    constant = [active for active in effects if active.effect.only_sets_constants]
+    modulus, _ = stages.stiffness(m, constant, [()] * len(constant), cable)
+    return cable._replace(modulus=modulus, damping=stages.viscosity(m, constant, cable))
 
 
 def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> CableState:
@@ -281,8 +280,9 @@ def _span_tension(
     if not effects:
         pull = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
         return pull, m.maximum(pull, 0.0)
-    effective = _with_effective_constants(m, cable, effects, state.effects)
-    pull = motion.elastic_tension + cable.area * (effective.damping * motion.strain_rate)
+    damping = stages.viscosity(m, effects, cable)
+    pull = motion.elastic_tension + cable.area * (damping * motion.strain_rate)
+    effective = _with_effective_constants(m, cable, effects)
     pull = pull + stages.added_tension(m, effects, state.effects, effective, motion)
     return pull, stages.carried_tension(m, effects, cable, pull)
 

@@ -108,7 +108,7 @@ def rope_speed(m: Mathematics, effects: Effects, states: States, winch_speed: An
 
 
 def added_tension(m: Mathematics, effects: Effects, states: States, cable: Any, motion: Any) -> Any:
-    """Tension beside that of the law, in N; ``cable`` has the modulus and damping that effects give it."""
+    """Tension beside that of the law, in N; ``cable`` has the constants that effects set."""
     total: Any = 0.0
     for active, effect_states in zip(effects, states):
         if active.effect.tension is not None:

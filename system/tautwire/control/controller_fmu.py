@@ -16,6 +16,7 @@ from ..fmus.component import INSTANCE_TYPES, Component, VariableBlock
 from ..fmus.fmi_binding import is_real_scalar, type_name
 from ..fmus.fmu_archive import read_model_description
 from ..fmus.fmu_variables import INPUT_TIME, MIDDLE_TIME
+from ..fmus.variable_units import unit_of
 from ..name_suggestions import suggest_name
 from ..robot.schema import AXES
 
@@ -45,7 +46,7 @@ class Sample(NamedTuple):
 class ControllerFmu:
     """A controller FMU; ``inputs`` and ``outputs`` are its matched variables with the robot's signals.
 
-    ``period`` is the sample period in s that it states, None where it states none.
+    ``period`` is the sample period in s that it is made for, None where it may be any.
 
     It is loaded at its first sample: a run in a worker process loads it there.
 
@@ -105,13 +106,13 @@ class ControllerFmu:
 
 
 def _stated_period(description: ModelDescription) -> float | None:
-    """The sample period in s by a parameter ``period``, or by the step size of an FMU that takes no other step."""
+    """The sample period in s that an FMU is made for: its parameter ``period`` where that has one value, else None."""
     for variable in description.modelVariables:
-        if variable.name == "period" and variable.causality in ("parameter", "calculatedParameter") and variable.start:
-            return float(variable.start)
-    takes_other_steps = description.coSimulation.canHandleVariableCommunicationStepSize
-    step = None if description.defaultExperiment is None else description.defaultExperiment.stepSize
-    return None if takes_other_steps or not step else float(step)
+        if variable.name == "period" and variable.causality == "parameter" and is_real_scalar(variable):
+            bounds = {variable.start, variable.min, variable.max}
+            start = variable.start if len(bounds) == 1 and unit_of(variable) == "s" else None
+            return None if start is None else float(start)
+    return None
 
 
 def _initialize(component: Component, inputs: VariableBlock) -> None:

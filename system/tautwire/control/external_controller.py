@@ -34,6 +34,7 @@ from .path_controller import PathController
 Array = NDArray[np.float64]
 SpeedLaw = Callable[[float, Array], ArrayLike]
 
+PERIOD_TOLERANCE = 1e-9
 DISCRETISATIONS = ("tustin", "zoh")
 
 
@@ -137,8 +138,8 @@ def fmu_controller(
 ) -> SpeedController:
     """Sampled-data controller from a co-simulation FMU, FMI 2.0 or 3.0, stepped by ``aim.period``.
 
-    Without ``aim`` the period is what the FMU states: the start of its parameter ``period``, or the step size of an FMU
-    that takes no other step. That is then the only period that an ``aim`` may have.
+    An FMU that is made for one period, its parameter ``period`` in s with equal bounds, has to be stepped by that:
+    without ``aim`` it is.
 
     Its inputs, by name, are measured, ``position_x`` and ``tension_i``, of a platform that ``is_rigid`` also
     ``orientation_w`` to ``orientation_z``, or expected on the path, with ``reference_`` before these names;
@@ -154,9 +155,9 @@ def fmu_controller(
     period = controller.period
     if aim is None and period is not None:
         aim = ControlAim(period=period)
-    elif aim is not None and period is not None and not isclose(aim.period, period, rel_tol=1e-9):
-        problem = f"it is made for samples every {period:g} s, aim.period is {aim.period:g} s"
-        raise ControllerFmuError(file, None, problem, f"give ControlAim(period={period:g})")
+    elif aim is not None and period is not None and not isclose(aim.period, period, rel_tol=PERIOD_TOLERANCE):
+        problem = f"it is made for samples every {period!r} s, aim.period is {aim.period!r} s"
+        raise ControllerFmuError(file, None, problem, f"give ControlAim(period={period!r})")
     return SpeedController(cable_count, _without_tare(aim), controller)
 
 

@@ -13,12 +13,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..linear import LinearPlant
 from ..robot.pose_trajectory import turns
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from .design import ControlAim, Design, Knot
 from .lqg import design_controller
+from .reachable_plant import integrated_coordinates
 
 Array = NDArray[np.float64]
 DesignPose = tuple[Sequence[float], Sequence[float] | None]
@@ -37,10 +39,20 @@ class DesignOfOnePlant(Design, Protocol):
 
 @dataclass(frozen=True)
 class ScheduledController:
-    """Controllers of one kind for ``times`` (s), rising, along a path."""
+    """Controllers of one kind for ``times`` (s), rising, along a path.
+
+    Raises InputError where they do not have the same states, which could not be interpolated.
+    """
 
     times: tuple[float, ...]
     controllers: tuple[DesignOfOnePlant, ...]
+
+    def __post_init__(self) -> None:
+        structures = [(list(plant.system.state_labels), integrated_coordinates(plant)) for plant in self.plants]
+        for time, structure in zip(self.times, structures, strict=True):
+            if structure != structures[0]:
+                problem = f"reach other states or coordinates at {time:g} s than at {self.times[0]:g} s"
+                raise InputError("ScheduledController: winches", problem, "schedule over a part of the path")
 
     @property
     def aim(self) -> ControlAim:

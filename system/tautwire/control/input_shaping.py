@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,19 +78,25 @@ def shaper(
     """
     if not damping_ratio < 1.0:
         raise InputError("damping_ratio", f"is {damping_ratio:g}, with which no mode swings", "give one below 1")
+    _require_kind(kind)
     damped_ratio = np.sqrt(1.0 - damping_ratio**2)
     outer, inner = 1.0 + tolerated_vibration, 2.0 - 2.0 * tolerated_vibration
     patterns = {"ZV": [1.0, 1.0], "ZVD": [1.0, 2.0, 1.0], "EI": [outer, inner, outer]}
-    if kind not in patterns:
-        raise InputError("kind", f"{kind!r} is not a known shaper", f"choose among {', '.join(patterns)}")
     pattern = np.array(patterns[kind])
     indices = np.arange(len(pattern))
     amplitudes = pattern * np.exp(-damping_ratio * np.pi / damped_ratio) ** indices
     return Shaper(amplitudes / np.sum(amplitudes), 0.5 * indices / (frequency * damped_ratio))
 
 
+def _require_kind(kind: str) -> None:
+    if kind not in get_args(ShaperKind):
+        hint = f"choose among {', '.join(get_args(ShaperKind))}"
+        raise InputError("kind", f"{kind!r} is not a known shaper", hint)
+
+
 def shaper_for_modes(frequencies: Array, damping_ratios: Array, kind: ShaperKind = "ZV") -> Shaper:
     """A shaper for several modes at once, one per mode in series; of no mode one impulse at once."""
+    _require_kind(kind)
     if not len(frequencies):
         return Shaper(np.ones(1), np.zeros(1))
     singles = [shaper(f, zeta, kind) for f, zeta in zip(frequencies.tolist(), damping_ratios.tolist(), strict=True)]

@@ -82,7 +82,8 @@ def require_positive_mass(root: CheckedTable, robot: Robot) -> None:
         mass = float(total_mass(robot))
     except (ArithmeticError, ValueError):
         return
-    if not mass > 0.0 and robot.platform.mass > 0.0:
+    # What is no number is NaN here, and refused already.
+    if mass <= 0.0 < robot.platform.mass:
         problem = f"with it the platform has a mass of {mass:g} kg"
         root.refuse("formula" if formula else "effect", problem, f"remove less than its {robot.platform.mass:g} kg")
 

@@ -9,7 +9,16 @@ from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.schema import EffectSetting
-from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
+from tautwire_fmu.laws.cable import (
+    LINEAR,
+    CableConstants,
+    CableInputs,
+    CableState,
+    cable_motion,
+    cable_outputs,
+    span,
+    start_state,
+)
 from tautwire_fmu.laws.effects import ALL, BY_NAME, UNLISTED, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL
 from tests.rig import load_robot, make_recording
@@ -28,6 +37,22 @@ def test_rope_and_frame_share_a_stretch_as_springs_in_series() -> None:
     shown = cable_outputs(REAL, cable, effects, state, cable_motion(REAL, cable, effects, state, line, 0.0))
     rope = 1e11 * 1e-5 / 10.01
     assert shown.tension - 500.0 == pytest.approx(0.01 / (1.0 / rope + COMPLIANCE), rel=1e-12)
+
+
+def test_a_rope_that_relaxes_shares_by_its_long_term_modulus() -> None:
+    cable = CableConstants(LINEAR, (0.0, 0.0, 10.0), 1e11, 1e-5, 0.0, 10.0, 500.0, (0.0, 0.0, 1.0), 9.81)
+    relaxation = BY_NAME["relaxation"]
+    added = {p.name: 5e10 if p.unit == "Pa" else 1.0 for p in relaxation.parameters}
+    effects = (
+        ActiveEffect(relaxation, relaxation.values(**added)),
+        ActiveEffect(FRAME, FRAME.values(compliance=COMPLIANCE)),
+    )
+    start = start_state(cable, effects)
+    line = span(REAL, cable, CableInputs((0.0, 0.0, -0.01), (0.0, 0.0, 0.0), 0.0), effects)
+    motion = cable_motion(REAL, cable, effects, start, line, 0.0)
+    share = 1.0 / (1.0 + COMPLIANCE * 1e11 * 1e-5 / 10.01)
+    expected = 500.0 + (motion.elastic_tension - 500.0) * share
+    assert cable_outputs(REAL, cable, effects, start, motion).tension == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("damping", [0.0, 2e8])
