@@ -15,7 +15,7 @@ from tests.bench.trace.__main__ import FEWEST_ALARMS, finished_sections
 from tests.bench.trace.cases import SIZES, Case, Kind, Part, main_cases, quick_cases
 from tests.bench.trace.figure import confusion_figure, save
 from tests.bench.trace.forms import FORMS, LISTED, UNLISTED
-from tests.bench.trace.line import Line, NamedEffect, Used, line_from, line_of, read_lines
+from tests.bench.trace.line import Line, NamedEffect, Used, keep, line_from, line_of, read_lines
 from tests.bench.trace.motion import declared
 from tests.bench.trace.score import confusion, held, outcome, rate, scored
 from tests.bench.trace.selection import alarm_cases, case_called, chosen
@@ -230,6 +230,27 @@ def test_a_line_survives_its_file_and_a_cut_one_is_left_out(tmp_path: Path) -> N
     path.write_text(f"{line.text()}\n{line.text()[:30]}", encoding="utf-8")
     assert read_lines(path) == (line,)
     assert read_lines(tmp_path / "none.jsonl") == ()
+
+
+def test_the_newest_answer_of_each_case_is_kept_without_rivals(tmp_path: Path) -> None:
+    path, line = tmp_path / "answers.jsonl", line_of("made", "f", "one", made_trace(), Used(8.0, 300.0))
+    other = replace(line, key="another")
+    assert keep(path, [line, other]) == read_lines(path) == (replace(other, rivals=()), replace(line, rivals=()))
+    newer = replace(line, code="two", rivals=())
+    assert keep(path, [newer])[1] == read_lines(path)[1] == newer
+
+
+def test_what_no_tracer_has_answered_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    cases, asked = alarm_cases(3), []
+
+    def alone(case: Case, folder: Path, code: str) -> Line:
+        asked.append(case.key)
+        return Line(case.key, case.fingerprint({}), code, verdict="none")
+
+    monkeypatch.setattr(runner, "_alone", alone)
+    kept = [Line(case.key, case.fingerprint({}), code) for case, code in zip(cases, ("old", "new"), strict=False)]
+    runner.run(cases, tmp_path, "new", 1, lambda case, line: None, kept)
+    assert asked == [cases[2].key, cases[0].key]
 
 
 def test_a_second_call_goes_on_where_the_first_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,13 +14,15 @@ from .cases import Case, main_cases, quick_cases
 from .figure import confusion_figure, save
 from .lifelike_cases import ALARM as LIFELIKE_ALARM
 from .lifelike_cases import lifelike_cases
-from .line import Line, read_lines
+from .line import Line, keep, read_lines
 from .platform_cases import platform_cases
 from .run import finished, run
 from .score import Scored, outcome, scored
 from .selection import ALARM, alarm_cases, chosen, code_version, lifelike_alarm_cases
 
 ROOT = EXAMPLES.parents[2]
+# The page's source, which goes with the repository: a part takes more hours than a session has.
+ANSWERS = Path(__file__).with_name("answers.jsonl")
 PICTURE = "tracer-confusion.svg"
 # Fewer empty recordings do not go to the page.
 FEWEST_ALARMS = 30
@@ -37,7 +39,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--platforms", action="store_true", help="platforms that turn, exact and lifelike")
     parser.add_argument("--list", action="store_true", help="name the cases and stop")
     parser.add_argument("--show", action="store_true", help="trace nothing; show the newest answers")
-    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "bench-trace", help="where answers are kept")
+    parser.add_argument(
+        "--folder", type=Path, default=ROOT / "build" / "bench-trace", help="recordings and new answers"
+    )
     return parser.parse_args()
 
 
@@ -47,10 +51,12 @@ def main() -> None:
     if asked.list:
         print("\n".join(case.key for case in cases))
         return
-    old = read_lines(asked.folder / "results.jsonl")
-    lines = finished(cases, old) if asked.show else run(cases, asked.folder, code_version(), asked.jobs, tell)
-    show(scored(cases, lines))
-    write(asked.folder)
+    kept = keep(ANSWERS, read_lines(asked.folder / "results.jsonl"))
+    if not asked.show:
+        run(cases, asked.folder, code_version(), asked.jobs, tell, kept)
+        kept = keep(ANSWERS, read_lines(asked.folder / "results.jsonl"))
+    show(scored(cases, finished(cases, kept)))
+    write(kept)
 
 
 def cases_of(asked: argparse.Namespace) -> Sequence[Case]:
@@ -75,12 +81,11 @@ def show(answers: Sequence[Scored]) -> None:
         print(f"\n{text(answers)}")
 
 
-def write(folder: Path) -> None:
+def write(lines: Sequence[Line]) -> None:
     """The page and its picture in docs, with the parts whose every case has an answer; the others stay as they are.
 
     Of each case the newest answer counts; the page tells by which versions of the tracer.
     """
-    lines = read_lines(folder / "results.jsonl")
     sections = finished_sections(lines)
     path = ROOT / "docs" / "tracer.md"
     if document.EXACT[0] in sections:

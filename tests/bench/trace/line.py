@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -142,6 +143,14 @@ def read_lines(path: Path) -> tuple[Line, ...]:
         return ()
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     return tuple(line_from(line) for line in lines if line.endswith("\n"))
+
+
+def keep(path: Path, lines: Sequence[Line]) -> tuple[Line, ...]:
+    """The newest line of each case, those of a file and others after them; written to it without rivals, by name."""
+    newest = {line.key: replace(line, rivals=()) for line in (*read_lines(path), *lines)}
+    kept = tuple(newest[key] for key in sorted(newest))
+    path.write_text("".join(f"{line.text()}\n" for line in kept), encoding="utf-8")
+    return kept
 
 
 def _best(trace: Trace) -> tuple[Rival, ...]:

@@ -19,18 +19,25 @@ ALONE = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def run(
-    cases: Sequence[Case], folder: Path, code: str, jobs: int, tell: Callable[[Case, Line], None]
+    cases: Sequence[Case],
+    folder: Path,
+    code: str,
+    jobs: int,
+    tell: Callable[[Case, Line], None],
+    kept: Sequence[Line] = (),
 ) -> dict[str, Line]:
-    """A line for each case, by its name: those that results.jsonl of the folder has, and new ones.
+    """A line for each case, by its name: those that are ``kept`` or in results.jsonl of the folder, and new ones.
 
-    Old lines serve while neither the recordings nor the code have changed. A process that ends without a line, or
-    takes more than half an hour, leaves a line that says so.
+    Old lines serve while neither the recordings nor the code have changed; cases that no version of the tracer has
+    answered come first. A process that ends without a line, or takes more than half an hour, leaves a line that says
+    so.
     """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "results.jsonl"
     _drop_cut_line(path)
-    done = finished(cases, read_lines(path), code)
-    waiting = [case for case in cases if case.key not in done]
+    lines = (*kept, *read_lines(path))
+    done, answered = finished(cases, lines, code), finished(cases, lines)
+    waiting = sorted((case for case in cases if case.key not in done), key=lambda case: case.key in answered)
     with path.open("a", encoding="utf-8") as file, ThreadPoolExecutor(jobs) as pool:
         futures = {pool.submit(_alone, case, folder, code): case for case in waiting}
         try:
