@@ -1,0 +1,39 @@
+"""Recordings that lie beside the project, where they do; the project needs none of them."""
+
+import pytest
+
+from tautwire.estimation import Trace, trace
+from tautwire.recordings.recording import read_recording
+from tautwire.robot.robot_file_reader import read_robot
+from tests.support.folders import SHARED_RECORDINGS
+
+pytestmark = [
+    pytest.mark.validate,
+    pytest.mark.skipif(not SHARED_RECORDINGS.is_dir(), reason="no shared recordings beside the project"),
+]
+
+
+def traced(name: str) -> Trace:
+    folder = SHARED_RECORDINGS / name
+    robot = read_robot(folder / "robot.toml")
+    fit, check = (read_recording(folder / f"{role}.csv", robot.cable_count) for role in ("fit", "check"))
+    return trace(robot, fit, check)
+
+
+@pytest.mark.parametrize(("name", "effect"), [("a", "damping"), ("b", "pulley")])
+def test_what_exact_recordings_hide_is_named_alone_and_noise_is_left(name: str, effect: str) -> None:
+    result = traced(name)
+    assert (result.verdict, [each.name for each in result.effects]) == ("effects", [effect])
+    check = result.comparisons[1]
+    assert check.errors_after.position_rms < 1.2 * result.noise_floor.position_rms
+    assert check.errors_after.tension_rms < 1.2 * result.noise_floor.tension_rms
+
+
+def test_where_nothing_is_hidden_nothing_is_named() -> None:
+    assert traced("d").verdict == "none"
+
+
+@pytest.mark.parametrize(("name", "effect"), [("p2", "pulley"), ("p3", "hysteresis"), ("p6", "friction")])
+def test_on_robots_as_they_are_what_is_hidden_is_named_alone(name: str, effect: str) -> None:
+    result = traced(f"lifelike/{name}")
+    assert (result.verdict, [each.name for each in result.effects]) == ("effects", [effect])
