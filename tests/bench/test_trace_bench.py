@@ -236,8 +236,8 @@ def test_the_newest_answer_of_each_case_is_kept_without_rivals(tmp_path: Path) -
     path, line = tmp_path / "answers.jsonl", line_of("made", "f", "one", made_trace(), Used(8.0, 300.0))
     other = replace(line, key="another")
     assert keep(path, [line, other]) == read_lines(path) == (replace(other, rivals=()), replace(line, rivals=()))
-    newer = replace(line, code="two", rivals=())
-    assert keep(path, [newer])[1] == read_lines(path)[1] == newer
+    newer = replace(line, code="two", rivals=(), failure="Traceback\n  in a file\nValueError: none")
+    assert keep(path, [newer])[1] == read_lines(path)[1] == replace(newer, failure="ValueError: none")
 
 
 def test_what_no_tracer_has_answered_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

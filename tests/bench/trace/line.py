@@ -146,8 +146,14 @@ def read_lines(path: Path) -> tuple[Line, ...]:
 
 
 def keep(path: Path, lines: Sequence[Line]) -> tuple[Line, ...]:
-    """The newest line of each case, those of a file and others after them; written to it without rivals, by name."""
-    newest = {line.key: replace(line, rivals=()) for line in (*read_lines(path), *lines)}
+    """The newest line of each case, those of a file and others after them; written to it by name.
+
+    Without rivals, and of a failure only its message: a traceback has the machine's paths.
+    """
+    newest = {
+        line.key: replace(line, rivals=(), failure=line.failure.strip().rpartition("\n")[2])
+        for line in (*read_lines(path), *lines)
+    }
     kept = tuple(newest[key] for key in sorted(newest))
     path.write_text("".join(f"{line.text()}\n" for line in kept), encoding="utf-8")
     return kept
