@@ -53,6 +53,11 @@ class DataSplit:
     validation: DataSet
     notes: tuple[str, ...]
 
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """Roles of the recordings: the fit recording alone where it also validates."""
+        return ("fit",) if self.estimation.recording is self.validation.recording else ("fit", "check")
+
 
 def split_data(robot: Robot, noise: Noise, fit: Recording, check: Recording | None) -> DataSplit:
     """Split into estimation and validation data: the check recording validates, or the second half of the only one."""

@@ -67,3 +67,12 @@ def test_sensors_that_fall_silent_for_good_are_no_matter() -> None:
     # Over the half that is left it swings less than three times.
     assert found.frequency == pytest.approx(np.sqrt(ROBOT.gravity / 2.0) / (2.0 * np.pi), rel=0.1)
     assert set(found.outputs) == {"x", "y"}
+    assert found.on == ("fit", "check")
+
+
+def test_without_check_a_resonance_is_seen_in_fit_alone() -> None:
+    fit = recorded("three", 3, {"unlisted_swing": {"mass": 20.0, "length": 0.5}})
+    noise = estimate_noise(ROBOT, fit)
+    (resonance,) = find_resonances(ROBOT, Fitter(noise), split_data(ROBOT, noise, fit, None))
+    assert resonance.frequency == pytest.approx(0.705, rel=0.1)
+    assert resonance.on == ("fit",)

@@ -79,7 +79,7 @@ def find_resonances(
             if gain >= policy.min_output_gain_ratio * np.max(site_gains)
         )
         if not np.any(np.abs(modal_frequencies - frequency) < policy.mode_tolerance * modal_frequencies):
-            candidates.append((sum(gains), Resonance(frequency, affected_outputs, ("fit", "check"))))
+            candidates.append((sum(gains), Resonance(frequency, affected_outputs, split.roles)))
     best = max((gain for gain, _ in candidates), default=0.0)
     return tuple(resonance for gain, resonance in candidates if gain > best / policy.min_gain_ratio)
 
