@@ -115,6 +115,31 @@ def test_without_check_recording_its_errors_are_null() -> None:
         assert document[field]["fit"]["tension_rms"] > 0.0
 
 
+def test_without_check_recording_a_rigid_platform_has_the_same_keys_for_both() -> None:
+    trace = made_trace(check=False)
+    (fit,) = trace.comparisons
+    rotations = np.array([1e-3, 2e-3, 3e-3])
+    turning, floor = (
+        replace(each, orientation_rms=2e-3, rotations=rotations) for each in (fit.errors_before, trace.noise_floor)
+    )
+    platform = replace(trace.robot_before.platform, inertia=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    document = trace_document(
+        replace(
+            trace,
+            robot_before=replace(trace.robot_before, platform=platform),
+            comparisons=(replace(fit, errors_before=turning, errors_after=turning),),
+            noise_floor=floor,
+            normalised_innovation_variance=np.ones(9),
+            autocorrelations=(np.zeros(9), np.zeros(9)),
+        )
+    )
+    for errors in (document["error_before"], document["error_after"]):
+        assert list(errors["fit"]) == list(errors["check"])
+        assert errors["fit"]["rotations"] == {"x": 1e-3, "y": 2e-3, "z": 3e-3}
+        assert errors["check"]["orientation_rms"] is None
+        assert errors["check"]["rotations"] == {"x": None, "y": None, "z": None}
+
+
 @pytest.mark.parametrize("strange", [math.nan, math.inf, -math.inf])
 def test_null_replaces_what_is_not_finite(strange: float) -> None:
     trace = made_trace()

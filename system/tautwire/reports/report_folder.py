@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ..estimation.disturbance import Disturbance
 from ..estimation.localisation.component_residuals import ComponentResidual
@@ -17,7 +18,7 @@ from ..json_document import json_value, write_json
 from ..provenance import Provenance, provenance_of
 from ..recordings.recording import Recording
 from ..robot.robot_file_writer import write_robot
-from ..robot.schema import AXES
+from ..robot.schema import AXES, Robot
 from ..validation import validate_folder, validate_instance
 from .residual_file import RESIDUAL_FILE, write_residuals
 from .trace_report_page import trace_page
@@ -40,7 +41,7 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "formula": trace.formula,
         "error_before": _errors_by_role(trace, "errors_before"),
         "error_after": _errors_by_role(trace, "errors_after"),
-        "noise_floor": _errors(trace.noise_floor, trace.robot_before.cable_count),
+        "noise_floor": _errors(trace.noise_floor, trace.robot_before),
         "residual_is_noise": {"before": trace.noise_before, "after": trace.noise_after},
         "left": _by_output(trace, trace.normalised_innovation_variance),
         "autocorrelation": _by_output(trace, trace.autocorrelations[0]),
@@ -115,23 +116,24 @@ def _detectable(size: Detectable) -> dict[str, Any]:
 
 def _errors_by_role(trace: Trace, field: str) -> dict[str, Any]:
     comparisons = {role: comparison_by_role(trace, role) for role in ROLES}
-    count = trace.robot_before.cable_count
-    return {role: _errors(getattr(each, field) if each else None, count) for role, each in comparisons.items()}
+    robot = trace.robot_before
+    return {role: _errors(getattr(each, field) if each else None, robot) for role, each in comparisons.items()}
 
 
-def _errors(errors: Errors | None, cable_count: int) -> dict[str, Any]:
+def _errors(errors: Errors | None, robot: Robot) -> dict[str, Any]:
     """Root mean square errors in m, N and rad; all None where ``errors`` is None, without rad for a point mass."""
-    axes: Iterable[float] = errors.axes if errors else [math.nan] * len(AXES)
+    absent = np.full(len(AXES), np.nan)
+    errors = errors or Errors(np.nan, np.nan, absent, np.full(robot.cable_count, np.nan), rotations=absent)
     turning = (
         {"orientation_rms": errors.orientation_rms, "rotations": dict(zip(AXES, errors.rotations, strict=True))}
-        if errors is not None and len(errors.rotations)
+        if robot.platform.is_rigid_body
         else {}
     )
     return turning | {
-        "position_rms": errors.position_rms if errors else None,
-        "tension_rms": errors.tension_rms if errors else None,
-        "axes": dict(zip(AXES, axes, strict=True)),
-        "cables": errors.cables if errors else [None] * cable_count,
+        "position_rms": errors.position_rms,
+        "tension_rms": errors.tension_rms,
+        "axes": dict(zip(AXES, errors.axes, strict=True)),
+        "cables": errors.cables,
     }
 
 
