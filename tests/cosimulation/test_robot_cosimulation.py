@@ -1,5 +1,6 @@
 """Co-simulated FMUs against the rig's own equations and against the laws as one model."""
 
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,21 @@ def ramp_error(fmus: RobotFmus, robot: Robot, step: float) -> float:
     motion = cosimulate(fmus, CORNERS, speeds, step)
     exact = simulate(rig_of(robot), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     return float(np.linalg.norm(motion.position[-1] - exact.position[-1]))
+
+
+def with_descriptions(fmus: RobotFmus, folder: Path, changes: dict[str, str]) -> RobotFmus:
+    """The same FMUs, with texts replaced in their model descriptions."""
+
+    def changed(path: Path) -> Path:
+        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(folder / path.name, "w") as copy:
+            for name in archive.namelist():
+                content = archive.read(name)
+                for old, new in changes.items() if name == "modelDescription.xml" else ():
+                    content = content.replace(old.encode(), new.encode())
+                copy.writestr(name, content)
+        return folder / path.name
+
+    return replace(fmus, platform=changed(fmus.platform), cables=tuple(map(changed, fmus.cables)))
 
 
 @pytest.mark.parametrize(("step", "bound"), [(0.1, 5e-7), (0.05, 2e-8), (0.01, 1e-9)])
@@ -146,6 +162,28 @@ def test_steps_chosen_by_a_tolerance_keep_it(three_fmus: RobotFmus, tolerance: f
     assert np.max(np.abs(motion.position[-1] - exact.position[-1])) < tolerance
     assert motion.statistics.estimated_error is not None and motion.statistics.estimated_error <= tolerance
     assert motion.statistics.steps < 600
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {
+            ' unit="m"': ' declaredType="Length"',
+            "<LogCategories>": '<TypeDefinitions><SimpleType name="Length"><Real unit="m"/></SimpleType>'
+            "</TypeDefinitions><LogCategories>",
+        },
+        {' unit="m"': ' unit="metre"', '<Unit name="m">': '<Unit name="metre">'},
+    ],
+    ids=["declared type", "another name"],
+)
+def test_lengths_count_for_the_tolerance_however_their_unit_is_stated(
+    three_fmus: RobotFmus, tmp_path: Path, changes: dict[str, str]
+) -> None:
+    speeds = np.clip(RAMP * CORNERS[:, None], -1.0, 1.0)
+    restated = cosimulate(with_descriptions(three_fmus, tmp_path, changes), CORNERS, speeds, tolerance=1e-4)
+    usual = cosimulate(three_fmus, CORNERS, speeds, tolerance=1e-4)
+    assert restated.statistics.estimated_error == usual.statistics.estimated_error
+    assert restated.statistics.steps == usual.statistics.steps
 
 
 def swing_energy(robot: Robot, motion: CosimulationResult) -> np.ndarray:

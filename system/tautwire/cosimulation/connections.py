@@ -61,7 +61,7 @@ def check_connections(components: Mapping[str, Component], connections: Sequence
         source = _variable(components, connection, connection.source, "output")
         target = _variable(components, connection, connection.target, "input")
         _require_real_scalars(connection, source, target)
-        source_unit, target_unit = (_unit(components, end) for end in (connection.source, connection.target))
+        source_unit, target_unit = (unit_at(components, end) for end in (connection.source, connection.target))
         if not same_unit(source_unit, target_unit):
             raise WiringError(f"{connection}: units differ, {source_unit[0]!r} and {target_unit[0]!r}")
         if connection.target in connections_by_target:
@@ -72,7 +72,8 @@ def check_connections(components: Mapping[str, Component], connections: Sequence
         connections_by_target[connection.target] = connection
 
 
-def _unit(components: Mapping[str, Component], port: Port) -> tuple[str | None, UnitDefinition | None]:
+def unit_at(components: Mapping[str, Component], port: Port) -> tuple[str | None, UnitDefinition | None]:
+    """Unit of a port, with its definition, as the variable or its type states it; None where neither does."""
     component = components[port.component]
     unit = unit_of(component.variables[port.variable])
     return unit, None if unit is None else unit_definition(component.description, unit)

@@ -13,11 +13,15 @@ from threadpoolctl import ThreadpoolController
 
 from ..fmus.component import Component, VariableBlock
 from ..fmus.fmu_variables import Port
+from ..fmus.variable_units import definition_from_exponents, same_unit
+from .connections import unit_at
 from .coupling_solver import CouplingSolver
 from .step_size_control import StepSizeControl
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
+
+METRE = ("m", definition_from_exponents({"m": 1}))
 
 
 class InputSource(Protocol):
@@ -147,15 +151,15 @@ def _run_loop(
 
 
 class _ObservedOutputs:
-    """Reads the observed outputs, and those of them that are lengths (unit m); ``row`` is that of the last time."""
+    """Reads the observed outputs, and those of them that are lengths, in metres; ``row`` is that of the last time."""
 
     def __init__(self, coupling: CouplingSolver, ports: Sequence[Port]) -> None:
         self._coupling = coupling
         self._blocks: list[tuple[Component, VariableBlock, NDArray[np.intp]]] = []
         components = coupling.graph.components
         self.row = np.zeros(len(ports))
-        units = [components[p.component].variables[p.variable].unit for p in ports]
-        self._length_mask = np.array([unit == "m" for unit in units], dtype=bool)
+        units = [unit_at(components, port) for port in ports]
+        self._length_mask = np.array([unit[0] is not None and same_unit(unit, METRE) for unit in units], dtype=bool)
         for name in dict.fromkeys(port.component for port in ports):
             indices = [i for i, port in enumerate(ports) if port.component == name]
             block = components[name].block([ports[i].variable for i in indices])
