@@ -1,6 +1,7 @@
 """The verdict on a rope: on the paper's measured table, and on tables whose answer is known."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,12 +20,14 @@ from tautwire.materials import (
     trace_material,
     with_material,
 )
-from tautwire.materials.material_files import material_document, material_figure
+from tautwire.materials.material_files import material_document, material_figure, write_material
 from tautwire.materials.material_report import verdict_notes, verdict_sentence
 from tautwire.materials.material_table import MaterialRow
 from tautwire.materials.material_verdict import MaterialOptions
 from tautwire.materials.robot_material import declared_material
 from tautwire.materials.viscoelastic_model import Material, MaxwellBranch
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import EffectSetting
 from tests.support.materials import CONSTANT, observed, written
 from tests.support.robots import example
 
@@ -184,7 +187,7 @@ def test_the_figure_shows_every_row_and_both_models(measured: MaterialVerdict) -
     assert "GPa" in storage.get_ylabel()
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert [label.split(":")[0] for label in labels[:4]] == [
-        "declared pair",
+        "declared",
         "best constant pair",
         "relaxation alone",
         "chosen",
@@ -245,11 +248,55 @@ def test_a_robot_takes_the_rope() -> None:
     assert setting.cables == (1, 2, 3)
     assert {name: setting.values[name] for name in rope.relaxation} == rope.relaxation
     assert setting.values["modulus_3"] == 0.0
-    assert declared_material(robot, "robot.toml") == Material(100e9, rope.damping)
+    assert declared_material(robot, "robot.toml") == Material(100e9, rope.damping, rope.branches)
+
+
+def test_what_acts_in_a_robots_ropes_is_declared() -> None:
+    branches = {"modulus": 20e9, "time": 0.3, "modulus_3": 10e9, "time_3": 4.0}
+    robot = example("three")
+    for name, values in (("modulus", {"modulus": 1.1e11}), ("damping", {"damping": 7e8}), ("relaxation", branches)):
+        robot = robot.with_effect(EffectSetting(name, values, robot.cable_numbers))
+    assert declared_material(robot, "robot.toml") == Material(
+        1.1e11, 7e8, (MaxwellBranch(20e9, 0.3), MaxwellBranch(10e9, 4.0))
+    )
+    alone = example("three").with_effect(EffectSetting("damping", {"damping": 7e8}, (2,)))
+    with pytest.raises(InputError, match="2 different ropes"):
+        declared_material(alone, "robot.toml")
+
+
+def test_a_declared_relaxation_that_is_right_is_left_alone(tmp_path: Path) -> None:
+    relaxing = replace(CONSTANT, branches=(MaxwellBranch(60e9, 0.15),))
+    table = read_material_table(written(tmp_path / "t.csv", observed(relaxing, FREQUENCY, 0.02, seed=1)))
+    robot = with_material(example("three"), robot_material(relaxing))
+    verdict = trace_material(table, declared_material(robot, "robot.toml"))
+    assert (verdict.verdict, verdict.effects) == ("none", ())
+    assert trace_material(table, CONSTANT).effects[0].name == "relaxation"
+    assert verdict.reference_model.label == "damping + relaxation"
+
+
+def test_a_robot_takes_the_uncertainties_of_its_new_rope(tmp_path: Path) -> None:
+    error = 0.02
+    table = read_material_table(written(tmp_path / "t.csv", observed(CONSTANT, FREQUENCY, error, seed=1)))
+    robot = example("three")
+    cables = tuple(replace(each, modulus_uncertainty=3e11, damping_uncertainty=2e10) for each in robot.cables)
+    (folder := tmp_path / "out").mkdir()
+    verdict = trace_material(table, CONSTANT)
+    write_material(verdict, folder, replace(robot, cables=cables))
+    cable = read_robot(folder / "robot.toml").cables[0]
+    # Of a mean of eight rows that are known to 2 % each, if all of them counted for the modulus alone.
+    least = error * CONSTANT.modulus / math.sqrt(len(FREQUENCY))
+    assert cable.modulus_uncertainty > 0.9 * least
+    for estimate, deviation in zip(
+        verdict.model("robot").estimates, (cable.modulus_uncertainty, cable.damping_uncertainty), strict=False
+    ):
+        assert not (estimate.low_is_open or estimate.high_is_open)
+        assert 2.0 * 1.96 * deviation == pytest.approx(estimate.high - estimate.low, rel=1e-3)
+    declared = json.loads((folder / "fit.json").read_text())["robot"]
+    assert declared["modulus_uncertainty"] == pytest.approx(cable.modulus_uncertainty)
 
 
 def test_a_robot_of_two_ropes_is_refused() -> None:
     robot = example("three")
     other = replace(robot.cables[0], modulus=1e11)
-    with pytest.raises(InputError, match="2 different pairs"):
+    with pytest.raises(InputError, match="2 different ropes"):
         declared_material(replace(robot, cables=(other, *robot.cables[1:])), "robot.toml")

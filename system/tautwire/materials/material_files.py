@@ -26,7 +26,7 @@ from .material_verdict import (
 )
 from .model_selection import CrossValidation
 from .modulus_observations import ModulusObservations
-from .robot_material import robot_material, with_material
+from .robot_material import RobotMaterial, robot_material, with_material
 from .viscoelastic_model import storage_modulus, viscous_damping
 
 CURVE_POINTS = 400
@@ -40,9 +40,15 @@ MATERIAL_FILES = ("fit.json", "material.png", "material.svg", "relaxation.toml",
 DOTS_PER_INCH = 150
 
 
+def fitted_rope(verdict: MaterialVerdict) -> RobotMaterial:
+    """The fitted rope as a robot file holds it."""
+    model = verdict.model("robot")
+    return robot_material(model.material, model.estimates)
+
+
 def material_document(verdict: MaterialVerdict) -> dict[str, Any]:
     """The verdict in plain types, SI units."""
-    rope = robot_material(verdict.model("robot").material)
+    rope = fitted_rope(verdict)
     return {
         "verdict": verdict.verdict,
         "sentence": verdict_sentence(verdict),
@@ -67,6 +73,8 @@ def material_document(verdict: MaterialVerdict) -> dict[str, Any]:
         "robot": {
             "modulus": rope.modulus,
             "damping": rope.damping,
+            "modulus_uncertainty": rope.modulus_uncertainty,
+            "damping_uncertainty": rope.damping_uncertainty,
             "effect": {"relaxation": dict(rope.relaxation)} if rope.branches else {},
         },
         "notes": list(verdict_notes(verdict)),
@@ -234,7 +242,7 @@ def write_material(
     figure = material_figure(verdict)
     figure.savefig(folder / "material.png", dpi=DOTS_PER_INCH)
     figure.savefig(folder / "material.svg")
-    rope = robot_material(verdict.model("robot").material)
+    rope = fitted_rope(verdict)
     (folder / "relaxation.toml").write_text(f"{provenance.comment()}\n{rope.text()}", encoding="utf-8")
     if robot:
         write_robot(with_material(robot, rope), folder / "robot.toml", provenance, robot_file)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 
 from scipy.stats import chi2
 
@@ -112,7 +113,7 @@ def trace_material(
     options: MaterialOptions | None = None,
     progress: Progress = lambda what, done: None,
 ) -> MaterialVerdict:
-    """Identify a rope from a table; ``declared`` is the constant pair in use, ``progress`` a progress callback."""
+    """Identify a rope from a table; ``declared`` are the constants in use, ``progress`` a progress callback."""
     start_time = time.perf_counter()
     options = options or MaterialOptions()
     pair = options.pair or table.modulus_pairs()[0]
@@ -169,14 +170,14 @@ def _evaluated_models(
     options: MaterialOptions,
     progress: Progress,
 ) -> list[EvaluatedModel]:
-    """Evaluate all models that a report compares, the declared pair first."""
+    """Evaluate all models that a report compares, the declared one first."""
     fits: list[tuple[Role, MaterialFit]] = [
         ("constant", selection.best_fits[CONSTANT_PAIR]),
         ("relaxation", selection.best_fits[LINEAR_VISCOELASTIC]),
         ("chosen", selection.fit),
         *(("rival", selection.best_fits[rival]) for rival in selection.confusable_models(options.significance_level)),
     ]
-    models = [evaluate_model(observations, "declared", CONSTANT_PAIR.label, declared)] if declared else []
+    models = [evaluate_model(observations, "declared", _structure_of(declared).label, declared)] if declared else []
     for index, (role, fit) in enumerate(fits):
         progress(f"leaving out rows: {fit.structure.label}", index / len(fits))
         models.append(evaluate_fit(observations, role, fit, declared, cross_validate(observations, fit.structure)))
@@ -189,10 +190,14 @@ def _evaluated_models(
     return [*models, evaluate_fit(observations, "robot", robot_fit, declared)]
 
 
+def _structure_of(declared: Material) -> ModelStructure:
+    return replace(CONSTANT_PAIR, branches=len(declared.branches))
+
+
 def _identified_effects(
     selection: ModelSelection, chosen: EvaluatedModel, declared: Material | None, significance_level: float
 ) -> tuple[IdentifiedEffect, ...]:
-    """Terms that the declared pair lacks or has wrong, by falling likelihood ratio."""
+    """Terms that the declared rope lacks or has wrong, by falling likelihood ratio."""
     effects = [
         IdentifiedEffect(effect, _parameters_of(chosen, effect), selection.evidence(effect))
         for effect in selection.chosen.effects - CONSTANT_PAIR.effects
@@ -220,16 +225,17 @@ def _decide(
     reference: EvaluatedModel, chosen: EvaluatedModel, effects: tuple[IdentifiedEffect, ...], significance_level: float
 ) -> VerdictName:
     if not effects or (
-        reference.role == "declared" and reference.p_value >= significance_level and not _exceeds_constant_pair(effects)
+        reference.role == "declared" and reference.p_value >= significance_level and not _exceeds(effects, reference)
     ):
         return "none" if reference.p_value >= significance_level else "unexplained"
     adequate = chosen.p_value >= significance_level or _rms_residual(chosen) <= MAX_ADEQUATE_RMS
     return "effects" if adequate else "unexplained"
 
 
-def _exceeds_constant_pair(effects: tuple[IdentifiedEffect, ...]) -> bool:
-    """Whether the effects are more than other values of the constant pair."""
-    return any(effect.name not in ("modulus", "damping") for effect in effects)
+def _exceeds(effects: tuple[IdentifiedEffect, ...], declared: EvaluatedModel) -> bool:
+    """Whether the effects are more than other values of the declared constants."""
+    declared_effects = {"modulus", *_structure_of(declared.material).effects}
+    return any(effect.name not in declared_effects for effect in effects)
 
 
 def _rms_residual(model: EvaluatedModel) -> float:

@@ -23,7 +23,7 @@ MIN_PRINTED_P_VALUE = 1e-300
 COLLINEAR_RANK_CORRELATION = 0.9
 ADDED_EFFECTS = ("relaxation", "hysteresis")
 MODEL_TITLES: dict[Role, str] = {
-    "declared": "declared pair",
+    "declared": "declared",
     "constant": "best constant pair",
     "relaxation": "relaxation alone",
     "chosen": "chosen",
@@ -42,7 +42,7 @@ def verdict_sentence(verdict: MaterialVerdict) -> str:
     opening = f"A constant pair of modulus and damping is {'rejected' if refuted else 'adequate'}: the best one has"
     text = f"{opening} {chi_squared_text(constant)}"
     if verdict.reference_model.role == "declared":
-        text += f", the declared one {chi_squared_text(verdict.reference_model)}"
+        text += f", the declared rope {chi_squared_text(verdict.reference_model)}"
     if verdict.verdict == "unexplained":
         return (
             f"{text}. No model here is adequate: {verdict.chosen_model.label} has "

@@ -70,7 +70,7 @@ class EvaluatedModel:
     """Goodness of fit of one model against the table.
 
     ``storage_residuals`` and ``damping_residuals``, each (N,), are model less measured in standard deviations of the
-    table; ``degrees_of_freedom`` the numbers less free parameters. ``estimates`` is empty for a declared pair;
+    table; ``degrees_of_freedom`` the numbers less free parameters. ``estimates`` is empty for a declared rope;
     ``cross_validation`` is None for one, and where it was not computed.
     """
 
@@ -125,8 +125,8 @@ class RmsErrors:
 class MaterialVerdict:
     """Verdict on whether one pair of modulus and damping describes a rope, and if not, what does.
 
-    ``models`` has the declared pair, where there is one, first. ``relaxation_floor`` is the minimum of chi-squared over
-    damping and any number of branches. ``error_before`` and ``error_after`` are of the declared pair (else the best
+    ``models`` has the declared rope, where there is one, first. ``relaxation_floor`` is the minimum of chi-squared over
+    damping and any number of branches. ``error_before`` and ``error_after`` are of the declared rope (else the best
     constant one) and of the chosen model: ``fit`` for rows that were fitted, ``check`` for each row predicted from the
     others.
     """
@@ -159,7 +159,7 @@ class MaterialVerdict:
 
     @property
     def reference_model(self) -> EvaluatedModel:
-        """The reference: the declared pair, or where none is declared the best constant one."""
+        """The reference: the declared rope, or where none is declared the best constant one."""
         return self.model("declared" if self.models[0].role == "declared" else "constant")
 
     @property
@@ -236,7 +236,7 @@ def fit_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsE
 
 
 def prediction_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsErrors:
-    """Root mean square errors of cross-validated predictions; of a declared pair, never fitted, over all rows."""
+    """Root mean square errors of cross-validated predictions; of a declared rope, never fitted, over all rows."""
     if model.cross_validation is None:
         return fit_errors(observations, model)
     return _rms_errors(
