@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
@@ -11,13 +12,16 @@ import numpy as np
 import pytest
 
 from tautwire.campaigns import campaign_runner as writing
-from tautwire.campaigns.campaign_plan import DISTRIBUTION_KINDS, Compute, Distribution
+from tautwire.campaigns import trace_summary
+from tautwire.campaigns.campaign_plan import DISTRIBUTION_KINDS, Compute, Distribution, TracePlan
 from tautwire.campaigns.campaign_runner import planned_jobs, run_count
 from tautwire.campaigns.input_sampling import correlated_groups, draw_samples
 from tautwire.campaigns.parameter_space import KeyPathError, expand_key_path, leaves_of, with_values
 from tautwire.campaigns.plan_file import PLAN_KEYS, read_plan
 from tautwire.cli import run as command
 from tautwire.errors import InputError
+from tautwire.estimation.time_limit import DEFAULT_TIME_LIMIT, TimeLimit
+from tautwire.recordings.recording import read_recording
 from tautwire.robot.robot_file_reader import robot_content
 from tests.support.campaigns import AT_REST, moving, plan_file, read
 from tests.support.folders import ROOT
@@ -279,3 +283,19 @@ def test_bags_are_recordings_of_a_season_each_by_its_folder(is_sqlite: bool, tmp
     assert trace.recordings == (str(folder),)
     (next(each for each in folder.iterdir() if each.suffix != ".yaml")).write_bytes(b"another")
     assert read(tmp_path, 'robot = "robot.toml"\n[trace]\nrecordings = "season"').trace.digests != trace.digests
+
+
+def test_the_time_limit_of_traces_belongs_to_a_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def seconds_of(*arguments: object, time_limit: TimeLimit, **options: object) -> None:
+        raise ValueError(f"a limit of {time_limit.seconds:g} s")
+
+    monkeypatch.setattr(trace_summary, "trace", seconds_of)
+    (tmp_path / "season").mkdir()
+    shutil.copyfile(EXAMPLES / "three" / "fit.csv", tmp_path / "season" / "fit.csv")
+    text = 'robot = "robot.toml"\n[trace]\nrecordings = "season"\n'
+    plans = [read(tmp_path, text + limit) for limit in ("", "time_limit = 600.0\n", "time_limit = 30.0\n")]
+    assert plans[0].digest() == plans[1].digest() != plans[2].digest()
+    recording = read_recording(tmp_path / "season" / "fit.csv", 3)
+    assert TracePlan.time_limit == DEFAULT_TIME_LIMIT
+    reasons = [trace_summary.trace_row(plan, 0, recording)["failure"] for plan in plans]
+    assert reasons == [f"ValueError: a limit of {seconds} s" for seconds in (600, 600, 30)]

@@ -197,11 +197,15 @@ class Compute:
 
 @dataclass(frozen=True)
 class TracePlan:
-    """Recordings to trace, in the order of their names, with the ``digests`` of their contents."""
+    """Recordings to trace, each in at most ``time_limit`` (s), in the order of their names.
+
+    ``digests`` are those of their contents; ``alpha`` is the false-alarm rate.
+    """
 
     recordings: tuple[str, ...]
     digests: tuple[str, ...]
     alpha: float = 0.01
+    time_limit: float = 600.0
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,7 @@ SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
 COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
 CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
 ALPHA_RULE = NumberRule("the false-alarm rate", "", 1e-9, 0.5, default=TracePlan.alpha)
+TIME_LIMIT_RULE = NumberRule("the time limit of each trace", "s", 1.0, 1e6, default=TracePlan.time_limit)
 STEP_RULE = NumberRule("the longest macro step", "s", 1e-4, 1.0, default=Compute.step)
 SETTLE_RULE = NumberRule(
     "the time that runs continue after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle
@@ -276,7 +277,7 @@ def _read_trace(table: CheckedTable) -> TracePlan:
     trace = table.table("trace")
     if trace is None:
         return TracePlan((), ())
-    trace.require_known(("recordings", "alpha"))
+    trace.require_known(("recordings", "alpha", "time_limit"))
     folder = file_relative_to_plan(trace, trace.text("recordings", 'name a folder, as in recordings = "season"'))
     if not folder.is_dir():
         trace.refuse("recordings", f"is {format_value(str(folder))}, no folder", "name a folder of recordings")
@@ -284,7 +285,8 @@ def _read_trace(table: CheckedTable) -> TracePlan:
     if not files:
         hint = f"put files there that end in {', '.join(RECORDING_SUFFIXES)}, or folders of bags"
         trace.refuse("recordings", f"has no recording in {folder}", hint)
-    return TracePlan(tuple(map(str, files)), tuple(map(file_digest, files)), trace.number("alpha", ALPHA_RULE))
+    alpha, time_limit = trace.number("alpha", ALPHA_RULE), trace.number("time_limit", TIME_LIMIT_RULE)
+    return TracePlan(tuple(map(str, files)), tuple(map(file_digest, files)), alpha, time_limit)
 
 
 def _is_recording(path: Path) -> bool:

@@ -11,10 +11,11 @@ from typing import Any
 import pyarrow as pa
 
 from ..estimation import trace
+from ..estimation.time_limit import TimeLimit
 from ..recordings.recording import Recording
 from ..reports.report_folder import trace_document
 from ..robot.robot_file_reader import robot_from_content
-from .campaign_plan import Plan
+from .campaign_plan import Plan, TracePlan
 from .campaign_run import failure_reason
 from .dataset_schema import FAILURE_COLUMN, Row
 
@@ -24,10 +25,11 @@ def trace_row(plan: Plan, index: int, recording: Recording) -> Row:
 
     Raises OSError where the machine fails, not the trace.
     """
-    alpha = plan.trace.alpha if plan.trace else 0.01
+    options = plan.trace or TracePlan((), ())
+    robot, limit = robot_from_content(dict(plan.content), plan.file), TimeLimit(options.time_limit)
     row: Row = {"index": index, "recording": Path(recording.path).name}
     try:
-        document = trace_document(trace(robot_from_content(dict(plan.content), plan.file), recording, alpha=alpha))
+        document = trace_document(trace(robot, recording, alpha=options.alpha, time_limit=limit))
     except OSError:
         raise
     except Exception as error:
