@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_plan import Plan, PlanError
 from tautwire.campaigns.campaign_run import Job, build_context, run_job
 from tautwire.campaigns.campaign_runner import path_recordings
 from tautwire.campaigns.fmu_cache import FmuBundle, build_bundle, cached_fmus, structure_digest
@@ -181,6 +181,22 @@ def test_a_path_is_read_by_the_columns_of_the_robot_file(tmp_path: Path) -> None
     robot = robot_from_content(dict(read_back.content), read_back.file)
     speeds = path_recordings(read_back, robot)["log"].winch_speed
     np.testing.assert_allclose(speeds, [[-0.001, -0.002, -0.003]] * 2)
+
+
+def test_a_recorded_path_starts_where_its_recording_starts(tmp_path: Path) -> None:
+    header = "time,winch_speed_1,winch_speed_2,winch_speed_3,x,y,z"
+    rows = [f"{0.01 * row},0,0,0,28.9,0.1,5.4" for row in range(6)]
+    (tmp_path / "speeds.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    plan = plan_file(tmp_path, AT_REST + '[[path]]\nrecording = "speeds.csv"\n')
+    with (tmp_path / "robot.toml").open("a", encoding="utf-8") as robot_file:
+        robot_file.write("[effect.sensor_offset]\nposition_offset_z = 0.1\n")
+    read_back = read_plan(plan)
+    recordings = path_recordings(read_back, robot_from_content(dict(read_back.content), read_back.file))
+    row = run_job(build_context(read_back, recordings), Job(0, 0, 0, VALUES), tmp_path / "kept").row
+    assert [row[f"end_{axis}"] for axis in "xyz"] == pytest.approx([28.9, 0.1, 5.3], abs=1e-6)
+    plan.write_text(plan.read_text(encoding="utf-8").replace("platform.mass", '"platform.start[1]"'), encoding="utf-8")
+    with pytest.raises(PlanError, match="has a start of its own"):
+        read_plan(plan)
 
 
 @pytest.mark.validate

@@ -163,9 +163,9 @@ class Correlation:
 class PathPlan:
     """A path: ``kind`` is "line", "helix" or "recording"; ``numbers`` are those of its kind in SI units.
 
-    ``start`` is where a line starts, None for the robot's start; so are the unit quaternions ``start_orientation`` and
-    ``end_orientation``, None where the path does not turn. ``recording`` is a file of winch speeds, and ``digest`` is
-    that of its content.
+    ``start`` is where a line or a recording starts, None for the robot's start; so are the unit quaternions
+    ``start_orientation`` and ``end_orientation``, None where the path does not turn. ``recording`` is a file of winch
+    speeds, and ``digest`` is that of its content.
     """
 
     name: str

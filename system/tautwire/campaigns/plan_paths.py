@@ -9,6 +9,7 @@ from pathlib import Path
 from ..errors import format_value
 from ..input_files import read_bytes
 from ..recordings.recording import read_recording
+from ..recordings.start_position import at_recorded_start
 from ..robot.checked_table import CheckedTable
 from ..robot.schema import Platform, Quaternion, Robot
 from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
@@ -50,7 +51,8 @@ def read_paths(table: CheckedTable, robot: Robot, inputs: tuple[Input, ...]) -> 
             path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
         start_varies = any(each.key.startswith("platform.start") for each in inputs)
         if start_varies and (path.kind == "helix" or path.start is not None or path.start_orientation is not None):
-            path_table.refuse("", "has a start of its own, but platform.start varies", "leave start out of a line")
+            hint = "leave start out of a line, positions out of a recording"
+            path_table.refuse("", "has a start of its own, but platform.start varies", hint)
         paths.append(path)
     return tuple(paths)
 
@@ -83,7 +85,18 @@ def read_path(table: CheckedTable, default: str, robot: Robot) -> PathPlan:
     until = table.number("until", UNTIL_RULE) if "until" in table.content else duration
     if until < second_time:
         table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
-    return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
+    platform = at_recorded_start(robot, recording)[0].platform
+    return PathPlan(
+        name,
+        "recording",
+        {"duration": min(until, duration)},
+        start=None if platform.start == robot.platform.start else platform.start,
+        recording=str(file),
+        digest=file_digest(file),
+        start_orientation=(
+            None if platform.start_orientation == robot.platform.start_orientation else platform.start_orientation
+        ),
+    )
 
 
 def _with_orientations(table: CheckedTable, robot: Robot, path: PathPlan) -> PathPlan:

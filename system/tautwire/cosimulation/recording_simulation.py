@@ -15,9 +15,7 @@ from ..errors import RecordingError
 from ..fmus.fmu_slots import notes_on_user_fmus
 from ..fmus.packaging import RobotFmus, build_fmus
 from ..recordings.recording import Recording, read_recording
-from ..recordings.start_position import start_pose, with_start
-from ..recordings.white_noise_estimate import white_noise_deviation
-from ..robot.measured_start import with_measured_start, with_true_start
+from ..recordings.start_position import at_recorded_start
 from ..robot.rigid_equilibrium import orientation_notes
 from ..robot.schema import Robot
 from . import (
@@ -94,15 +92,12 @@ class RecordedInputs:
 def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -> RecordedInputs:
     """Read the winch speeds of a recording up to ``until`` (s); RecordingError where these are fewer than two."""
     recording = read_recording(path, robot.cable_count, robot.recorded_columns)
-    noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
-    start, notes = start_pose(robot, noise, recording)
-    robot = with_start(robot, robot.platform.start, start.orientation)
+    started, notes = at_recorded_start(robot, recording)
     count = _sample_count(recording, until)
     inputs = PiecewiseLinearInput(recording.time[:count], recording.winch_speed[:count])
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
     notes = (*recording.notes, *notes, *notes_on_user_fmus(robot))
-    started = with_true_start(with_measured_start(robot, start.position))
     return RecordedInputs(started, inputs, (*notes, *orientation_notes(started)))
 
 

@@ -8,7 +8,7 @@ from math import hypot
 import numpy as np
 
 from ..errors import UnreachableError
-from ..robot.measured_start import shown_position
+from ..robot.measured_start import shown_position, with_measured_start, with_true_start
 from ..robot.schema import AXES, Point, Quaternion, Robot
 from ..robot.static_equilibrium import static_tensions
 from .consistency import CONSISTENCY_HINT, describe_start, require_matching_reeling, require_start_within_robot
@@ -50,6 +50,14 @@ def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tup
     orientation, orientation_notes = _start_orientation(robot, recording)
     position, notes = _start_position(robot, position_noise, recording, orientation)
     return StartPose(position, orientation), (*notes, *orientation_notes)
+
+
+def at_recorded_start(robot: Robot, recording: Recording) -> tuple[Robot, tuple[str, ...]]:
+    """The robot truly where its sensors show that a recording starts, and notes and errors as of :func:`start_pose`."""
+    noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
+    start, notes = start_pose(robot, noise, recording)
+    robot = with_start(robot, robot.platform.start, start.orientation)
+    return with_true_start(with_measured_start(robot, start.position)), notes
 
 
 def _start_position(
