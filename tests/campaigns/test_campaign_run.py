@@ -108,6 +108,22 @@ def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     assert one["end_z"] == motion.position[-1, 2]
 
 
+@pytest.mark.parametrize(("controller", "variant"), [("feedforward", 0), ("feedforward", 1), ("lqg", 1)])
+def test_outputs_are_true_whatever_sensors_show(controller: str, variant: int, tmp_path: Path) -> None:
+    plan = plan_file(tmp_path, moving().replace('"feedforward"', f'"{controller}"'))
+    with (tmp_path / "robot.toml").open("a", encoding="utf-8") as robot_file:
+        robot_file.write("[effect.sensor_offset]\ntension_offset = -2e3\nposition_offset_x = 0.02\n")
+        robot_file.write("[effect.sensor_gain]\ntension_gain = 1.1\nposition_gain = 1.01\n")
+    shared = build_context(read_plan(plan), {})
+    row = run_job(shared, Job(0, 0, variant, VALUES), tmp_path / "kept").row
+    assert "failure" not in row
+    # The path is a millimetre long, and moves as slowly as tensions of statics allow.
+    assert np.allclose([row[f"end_{axis}"] for axis in "xyz"], (28.86, 0.0, 5.0), atol=0.1)
+    assert row["slack"] is False
+    for cable in (1, 2, 3):
+        assert row[f"tension_{cable}_least"] == pytest.approx(row[f"static_tension_{cable}"], rel=0.2)
+
+
 @pytest.mark.validate
 @pytest.mark.parametrize("changed", ["damping", "winch", "eight"])
 def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tmp_path: Path) -> None:

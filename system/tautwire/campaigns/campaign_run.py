@@ -43,6 +43,7 @@ from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan
 from .dataset_schema import FAILURE_COLUMN, ORIENTATION_COLUMNS, Row, mode_numbers, series_columns
 from .fmu_cache import FmuBundle, build_bundle, cached_fmus
 from .parameter_space import with_values
+from .true_motion import without_gains_and_offsets, without_sensor_effects
 
 Array = NDArray[np.float64]
 
@@ -232,7 +233,7 @@ def _run_stages(context: CampaignContext, job: Job, fmu_folder: Path) -> Iterabl
         reference_input = context.reference_inputs.get(job.variant) or build_reference_input(
             _nominal_robot(robot, plan), plan.paths[path_index], controller, plan.compute, context.recordings
         )
-        motion = _simulate(cached_fmus(robot, context.bundle, fmu_folder), reference_input, plan, job)
+        motion = _true_motion(robot, context.bundle, fmu_folder, reference_input, plan, job)
         yield _motion_outputs(robot, reference_input, motion), _resampled_series(motion, plan.compute.series)
 
 
@@ -255,6 +256,16 @@ def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
     frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in numbers}
     damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in numbers}
     return {**frequencies, **damping_ratios, "stiffness_least": min_stiffness}
+
+
+def _true_motion(
+    robot: Robot, bundle: FmuBundle, fmu_folder: Path, reference_input: ReferenceInput, plan: Plan, job: Job
+) -> CosimulationResult:
+    """The motion of a run, not as its sensors show it: these matter to it only where a controller feeds them back."""
+    design = reference_input.design
+    simulated = robot if design is not None and design.uses_feedback else without_sensor_effects(robot)
+    fmus = cached_fmus(simulated, bundle, fmu_folder)
+    return without_gains_and_offsets(simulated, fmus, _simulate(fmus, reference_input, plan, job))
 
 
 def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job: Job) -> CosimulationResult:

@@ -22,6 +22,13 @@ def shown_position(robot: Robot, position: Vector, mathematics: Mathematics = RE
     return add(scale(gain, position), offset)
 
 
+def true_position(robot: Robot, shown: Vector, mathematics: Mathematics = REAL) -> Vector:
+    """The position ``(y - o) / k`` in m of which the sensor shows ``y``; also of columns, each with its coordinate."""
+    gain, offset = _gain_and_offset(robot, mathematics)
+    x, y, z = ((coordinate - error) / gain for coordinate, error in zip(shown, offset, strict=True))
+    return x, y, z
+
+
 def with_measured_start(robot: Robot, start: Point, orientation: Quaternion | None = None) -> Robot:
     """The robot at the start of a recording, in m: by axis as declared, or another one, as the sensor shows it.
 
@@ -39,10 +46,10 @@ def with_true_start(robot: Robot, mathematics: Mathematics = REAL) -> Robot:
     """The robot at its true start, ``(y - o) / k`` along each axis on which the start is a measured one, ``y``."""
     if not any(robot.start_is_measured):
         return robot
-    gain, offset = _gain_and_offset(robot, mathematics)
+    true = true_position(robot, robot.platform.start, mathematics)
     x, y, z = (
-        (coordinate - error) / gain if is_measured else coordinate
-        for coordinate, error, is_measured in zip(robot.platform.start, offset, robot.start_is_measured, strict=True)
+        corrected if is_measured else coordinate
+        for coordinate, corrected, is_measured in zip(robot.platform.start, true, robot.start_is_measured, strict=True)
     )
     true_platform = replace(robot.platform, start=(x, y, z))
     return replace(robot, platform=true_platform, start_is_measured=(False, False, False))
