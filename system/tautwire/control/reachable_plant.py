@@ -99,7 +99,7 @@ def unseen_modes(linear: LinearPlant) -> tuple[HiddenModes, ...]:
 
 def _hidden_modes(A: Array, C: Array) -> list[tuple[complex, ComplexArray]]:
     """Non-decaying eigenvalues s, one of each pair, with the null space of [A - s I; C] where there is one."""
-    found: list[tuple[complex, ComplexArray]] = []
+    hidden: list[tuple[complex, ComplexArray]] = []
     tested: list[complex] = []
     for eigenvalue in np.linalg.eigvals(A).astype(complex).tolist():
         s = eigenvalue if abs(eigenvalue) > RANK_TOLERANCE else 0j
@@ -109,8 +109,8 @@ def _hidden_modes(A: Array, C: Array) -> list[tuple[complex, ComplexArray]]:
         tested.append(s)
         vectors = null_space(np.vstack([A - s * np.eye(len(A)), C]), rcond=RANK_TOLERANCE)
         if vectors.shape[1]:
-            found.append((s, vectors))
-    return found
+            hidden.append((s, vectors))
+    return hidden
 
 
 def reachable_plant(linear: LinearPlant) -> LinearPlant:
@@ -195,7 +195,7 @@ def _dropped_states(linear: LinearPlant, W: Array) -> list[int]:
 
 def _independent_rows(rows: Array, groups: Sequence[list[int]], tolerance: float) -> list[int]:
     """Indices, ascending, of rows that span all: of the first groups if possible, there the largest ones."""
-    found: list[int] = []
+    independent: list[int] = []
     remaining = rows
     for group in groups:
         if not group or not remaining.shape[1]:
@@ -204,9 +204,9 @@ def _independent_rows(rows: Array, groups: Sequence[list[int]], tolerance: float
         _, triangle, order = qr(weighted.T, mode="economic", pivoting=True)
         rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > tolerance))
         chosen = [group[index] for index in order[:rank]]
-        found += chosen
+        independent += chosen
         remaining = remaining @ null_space(remaining[chosen]) if chosen else remaining
-    return sorted(found)
+    return sorted(independent)
 
 
 def integrated_coordinates(linear: LinearPlant) -> list[int]:

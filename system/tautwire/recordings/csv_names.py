@@ -37,7 +37,7 @@ def first_samples(lines: Sequence[str]) -> list[FirstSample]:
     Where every line has a text, as in a column of states, those whose numbers are in the same columns as in the next.
     """
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and not is_comment(line)]
-    found, beside_text = [], []
+    of_numbers, beside_text = [], []
     for number, (index, line) in enumerate(rows):
         for separator in SEPARATORS:
             cells = split_cells(line, separator)
@@ -45,12 +45,12 @@ def first_samples(lines: Sequence[str]) -> list[FirstSample]:
                 continue
             are_samples = [_is_sample(cell) for cell in cells]
             if all(are_samples):
-                found.append(FirstSample(index, separator, len(cells)))
+                of_numbers.append(FirstSample(index, separator, len(cells)))
             elif sum(are_samples) > 1 and number + 1 < len(rows):
                 next_cells = split_cells(rows[number + 1][1], separator)
                 if [_is_sample(cell) for cell in next_cells] == are_samples:
                     beside_text.append(FirstSample(index, separator, len(cells)))
-    return found or beside_text
+    return of_numbers or beside_text
 
 
 def _is_sample(cell: str) -> bool:
