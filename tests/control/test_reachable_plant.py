@@ -12,12 +12,15 @@ import pytest
 from tautwire.control import (
     ClosedLoopOptions,
     Feedforward,
+    ScheduledController,
     cosimulate_closed_loop,
     design_controller,
     design_robust,
     margins_of,
+    ramp_plant,
     sample_times,
     schedule_controller,
+    speed_controller,
 )
 from tautwire.control.reachable_plant import reachable_plant, require_reachable
 from tautwire.errors import InputError
@@ -156,6 +159,18 @@ def test_friction_between_strands_stiffens_the_plant_of_the_design() -> None:
     assert np.abs(control.feedback(design.plant, design.regulator, 1).poles()).max() < 0.99
     assert list(design.linear.system.state_labels) == list(linearise(example("three")).system.state_labels)
     assert margins_of(linearise(robot), design.knots()[0]).min_disk > 0.3
+
+
+def test_a_loop_that_small_errors_unsettle_is_noted() -> None:
+    assert design_controller(example("three")).notes == ()
+    design = design_controller(rigid_robots.underactuated_robot())
+    (note,) = design.notes
+    assert note.startswith("at [1.63957, -0.620978, -0.968457] m: the loop has a disk margin of 0.003")
+    # By the poles of the loop alone, with all gains wrong by as much as a margin of 0.1 would allow.
+    plant, feedback = ramp_plant(design.linear, design.aim.period), speed_controller(design.regulator)
+    radii = [max(abs(control.feedback(plant, gain * feedback, 1).poles())) for gain in (1.0, 1.11, 1.0 / 1.11)]
+    assert radii[0] < 1.0 < max(radii[1:])
+    assert ScheduledController((0.0, 1.0), (design, design)).notes == (note, note)
 
 
 def test_plant_within_reach_is_left_as_it_is() -> None:

@@ -21,6 +21,7 @@ from ..robot.trajectory import Trajectory
 from .design import ControlAim, Design, Knot
 from .lqg import design_controller
 from .reachable_plant import integrated_coordinates
+from .stability_margins import margin_notes
 
 Array = NDArray[np.float64]
 DesignPose = tuple[Sequence[float], Sequence[float] | None]
@@ -73,6 +74,11 @@ class ScheduledController:
     def plants(self) -> tuple[LinearPlant, ...]:
         """The plants that it is designed on."""
         return tuple(controller.linear for controller in self.controllers)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See :func:`tautwire.control.stability_margins.margin_notes`; takes up to some seconds for each point."""
+        return margin_notes(self.plants, self.knots())
 
     def knots(self) -> tuple[Knot, ...]:
         """See :class:`tautwire.control.Design`."""

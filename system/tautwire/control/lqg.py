@@ -25,6 +25,7 @@ from ..validation import validate_instance
 from .design import ControlAim, Knot, measurement_noise, pose_signals, regulator_signals, require_taut
 from .reachable_plant import integrated_coordinates, reachable_plant, require_reachable, twist_states
 from .sampled_plant import sampled_plant
+from .stability_margins import margin_notes
 
 Array = NDArray[np.float64]
 
@@ -93,6 +94,11 @@ class Controller:
         sum_correction = self.aim.period / self.aim.integral_time * np.linalg.pinv(of_sums)
         return np.vstack([self.plant.B[:size], -sum_correction])
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See :func:`tautwire.control.stability_margins.margin_notes`; takes up to some seconds."""
+        return margin_notes((self.linear,), self.knots())
+
     def knots(self) -> tuple[Knot, ...]:
         """See :class:`tautwire.control.Design`; one for the whole path."""
         return (Knot(0.0, self.regulator, self.tracking),)
@@ -107,7 +113,8 @@ def design_controller(
     """Designs LQG with integral action on the plant linearised at ``at``, three coordinates in m, by default the start.
 
     ``a_k = -K (x_k, w_k, z_k)``: winch accelerations (n,) in m/s^2 from the estimate of a Kalman filter, winch speeds
-    and summed errors of the pose, sampled at ``aim.period``. ``aim`` holds weights and limits. The ``orientation`` of a
+    and summed errors of the pose, sampled at ``aim.period``. ``aim`` holds weights and limits. ``notes`` of the design
+    tell where its disk margin is below 0.1. The ``orientation`` of a
     rigid platform is a unit quaternion, by default that of the robot file.
 
     Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold

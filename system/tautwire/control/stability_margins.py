@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import MODULUS
 
 from ..linear import LinearPlant, linearise
+from ..linear.operating_point import format_position
 from ..robot.active_effects import cable_moduli
 from ..robot.schema import Robot
 from .design import Knot
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 
 FREQUENCY_COUNT = 200
 MIN_RELATIVE_FREQUENCY = 1e-3
+# An error of 11 % in all gains, or 6 degrees of phase: moduli and payloads are known no better.
+MIN_DISK_MARGIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -149,6 +152,18 @@ def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
     classical = [_classical_margins(loop, omega) for loop in _single_loops(at_winches)]
     gain, phase = (min(values) for values in zip(*classical, strict=True))
     return Margins(radius, winch_disk, min(sensor_disks), gain, phase)
+
+
+def margin_notes(plants: Sequence[LinearPlant], knots: Sequence[Knot]) -> tuple[str, ...]:
+    """One line for each plant on which the loop of its controller has a disk margin below 0.1."""
+    margins = [margins_of(plant, knot).min_disk for plant, knot in zip(plants, knots, strict=True)]
+    return tuple(
+        f"at [{format_position(plant.position)}] m: the loop has a disk margin of {margin:.2g}, below "
+        f"{MIN_DISK_MARGIN:g}, so that small errors of the model unsettle it; where the winches hardly reach a mode, "
+        "arrange the cables otherwise"
+        for plant, margin in zip(plants, margins, strict=True)
+        if margin < MIN_DISK_MARGIN
+    )
 
 
 def margins_over(
