@@ -1,6 +1,5 @@
 """Co-simulated FMUs against the rig's own equations and against the laws as one model."""
 
-import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import EffectSetting, Platform, Robot
 from tests.rig import RampProgram, SampledProgram, simulate
+from tests.support.model_descriptions import with_descriptions
 from tests.support.rig_robots import CORNERS, RAMP, rig_of
 from tests.support.robots import NAMES, example, gentle_speeds, paper_robot, with_damping
 
@@ -24,21 +24,6 @@ def ramp_error(fmus: RobotFmus, robot: Robot, step: float) -> float:
     motion = cosimulate(fmus, CORNERS, speeds, step)
     exact = simulate(rig_of(robot), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     return float(np.linalg.norm(motion.position[-1] - exact.position[-1]))
-
-
-def with_descriptions(fmus: RobotFmus, folder: Path, changes: dict[str, str]) -> RobotFmus:
-    """The same FMUs, with texts replaced in their model descriptions."""
-
-    def changed(path: Path) -> Path:
-        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(folder / path.name, "w") as copy:
-            for name in archive.namelist():
-                content = archive.read(name)
-                for old, new in changes.items() if name == "modelDescription.xml" else ():
-                    content = content.replace(old.encode(), new.encode())
-                copy.writestr(name, content)
-        return folder / path.name
-
-    return replace(fmus, platform=changed(fmus.platform), cables=tuple(map(changed, fmus.cables)))
 
 
 @pytest.mark.parametrize(("step", "bound"), [(0.1, 5e-7), (0.05, 2e-8), (0.01, 1e-9)])

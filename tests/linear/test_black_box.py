@@ -27,6 +27,7 @@ from tautwire.linear import (
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu, Winch
 from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.effects import with_effects
+from tests.support.model_descriptions import with_descriptions
 from tests.support.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.support.rigid_robots import octahedral_robot
 from tests.support.robots import NAMES, example, paper_robot, with_winch
@@ -87,6 +88,24 @@ def test_rigid_platforms_are_the_plant_of_the_laws(tmp_path: Path) -> None:
     gains, expected = found.system(frequencies), exact(frequencies)[rows]
     assert np.max(np.abs(gains - expected) / np.max(np.abs(expected), axis=(0, 1))) < AGREES
     assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
+
+
+def test_fmus_that_take_steps_of_one_length_only_get_no_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    steps: dict[Component, set[float]] = {}
+    take_step = Component.step
+
+    def noted_step(component: Component, time: float, step: float) -> None:
+        steps.setdefault(component, set()).add(round(step, 12))
+        take_step(component, time, step)
+
+    monkeypatch.setattr(Component, "step", noted_step)
+    fmus = build_fmus(example("three"), tmp_path, native=True)
+    flexible = 'canHandleVariableCommunicationStepSize="true"'
+    (changed := tmp_path / "changed").mkdir()
+    plant = linearise_robot_fmus(with_descriptions(fmus, changed, {flexible: flexible.replace("true", "false")}))
+    assert len(set.union(*steps.values())) > 1
+    assert max(map(len, steps.values())) == 1
+    assert max(distances(plant, linearise(example("three")).system).values()) < AGREES
 
 
 def smooth(case: Case) -> bool:

@@ -97,7 +97,8 @@ def linearise_fmus(
     units, over three decades below a turn of half a radian a step.
 
     Requirements on an FMU: its start is at rest, and its behaviour over a step follows from its state and its inputs,
-    without dead time. Saved states are used if all FMUs support them; otherwise all restart for each pulse.
+    without dead time. Saved states are used if all FMUs support them and steps of any length; otherwise all restart for
+    each pulse, and take steps of one length until the next.
     Uncontrollable and unobservable states are not identified.
 
     Raises IdentificationError where the system is not at rest, or is not smooth there, the named states are

@@ -65,6 +65,8 @@ class Responses:
 class PulseExperiment:
     """Pulse experiments on a system of FMUs at rest; each starts from the same saved state, or from a restart.
 
+    They restart where an FMU cannot save its state, or takes steps of one length only: that may differ by experiment.
+
     Created by :func:`pulse_experiment`. ``rest_inputs`` (k,) are the coupling's external inputs at rest, ``inputs``
     those of them that get pulses, ``observed_ports`` the ports that are read, each with its ``negligible`` deviation.
     ``order`` is the order of the discretisation error in the step, or a lower bound of it.
@@ -83,7 +85,7 @@ class PulseExperiment:
         self._rest_inputs = dict(rest_inputs)
         self.inputs, self.observed_ports = tuple(inputs), tuple(observed_ports)
         self._coupling = self._start_coupling(stack)
-        self._rest_snapshot = self._coupling.save() if self._coupling.graph.supports_rollback else None
+        self._rest_snapshot = self._coupling.save() if self._coupling.graph.supports_variable_step else None
         if self._rest_snapshot is not None:
             stack.callback(self._coupling.release, self._rest_snapshot)
         self._takes_whole_steps = (
