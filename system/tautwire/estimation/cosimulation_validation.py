@@ -16,11 +16,12 @@ from tautwire_fmu.laws.mathematics import REAL
 from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from ..fmus.native.c_toolchain import NativeBuildError
 from ..fmus.packaging import RobotFmus, build_fmus
+from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..robot.active_effects import platform_effects
 from ..robot.schema import Robot
 from .estimation_data import DataSet
-from .measured_outputs import Outputs, measured_outputs, orientations, output_residuals, rotation_vectors
+from .measured_outputs import Outputs, measured_outputs, orientations, output_residuals
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, CosimulationPolicy
 from .smoothed_states import calibrate, with_initial_state

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..recordings.start_position import MAX_START_SAMPLES, START_ROWS, START_SIGNIFICANCE, start_position
 from ..robot.measured_start import with_measured_start, with_true_start
 from ..robot.schema import Quaternion, Robot
 from ..robot.static_equilibrium import start_orientation
 from .kalman_filter import Noise
-from .measured_outputs import orientations, rotation_vectors
+from .measured_outputs import orientations
 from .policy import DEFAULT_POLICY, FitPolicy
 
 

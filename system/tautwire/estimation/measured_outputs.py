@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from tautwire_fmu.laws.rotation import Quaternion
 
 from ..errors import RecordingError
+from ..recordings.quaternion_columns import rotation_vectors, rotations_between
 from ..recordings.recording import Recording
 from ..robot.schema import AXES
 
@@ -66,16 +67,7 @@ def output_residuals(measured: Outputs, simulated: Outputs) -> Array:
     linear = np.hstack([measured.position - simulated.position, measured.tension - simulated.tension])
     if measured.orientation is None or simulated.orientation is None:
         return linear
-    return np.hstack([linear, _rotations_between(simulated.orientation, measured.orientation)])
-
-
-def rotation_vectors(orientation: Array, reference: Quaternion | None = None) -> Array:
-    """Rotation vectors in rad from a reference (N, 3); the default is the first orientation. NaN where that is NaN."""
-    known = np.flatnonzero(np.isfinite(orientation).all(axis=1))
-    if not len(known):
-        return np.full((len(orientation), 3), np.nan)
-    first = orientation[known[0]] if reference is None else np.array(reference, dtype=float)
-    return _rotations_between(np.broadcast_to(first, orientation.shape), orientation)
+    return np.hstack([linear, rotations_between(simulated.orientation, measured.orientation)])
 
 
 def orientations(rotations: Array, reference: Quaternion) -> Array:
@@ -92,13 +84,3 @@ def require_small_rotations(recording: Recording, reference: Quaternion) -> None
         row = int(np.nanargmax(angles))
         problem = f"at {recording.time[row]:g} s the platform is turned by {largest:.3g} rad from its start"
         raise RecordingError(recording.path, problem, f"trace a part in which it turns by {MAX_ROTATION:g} rad at most")
-
-
-def _rotations_between(start: Array, end: Array) -> Array:
-    """Rotation vectors (N, 3), in rad and the axes of the world, from some orientations (N, 4) to others."""
-    vectors = np.full((len(end), 3), np.nan)
-    known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
-    if np.any(known):
-        first, second = (Rotation.from_quat(np.roll(each[known], -1, axis=1)) for each in (start, end))
-        vectors[known] = (second * first.inv()).as_rotvec()
-    return vectors

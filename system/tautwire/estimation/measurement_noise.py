@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.signal import spectrogram
 
 from ..errors import InputError
+from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from .kalman_filter import Noise
-from .measured_outputs import measured_outputs, output_names, rotation_vectors
+from .measured_outputs import measured_outputs, output_names
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import NoiseCheckPolicy
 

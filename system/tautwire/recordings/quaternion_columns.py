@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,16 +67,26 @@ def with_continuous_signs(recorded: Array) -> Array:
     return continuous
 
 
-def rotation_vectors(quaternions: Array) -> Array:
-    """Rotation vectors (N, 3) in rad and in the world's axes, from the first of unit quaternions (N, 4) to each.
+def rotation_vectors(quaternions: Array, reference: Sequence[float] | None = None) -> Array:
+    """Rotation vectors (N, 3), in rad and the world's axes, from a reference to unit quaternions (N, 4).
 
-    NaN where there is no quaternion; beyond half a turn, those of the shorter way.
+    The default is the first that is known. NaN where there is no quaternion; beyond half a turn, those of the shorter
+    way.
     """
-    is_known = np.isfinite(quaternions).all(axis=1)
-    vectors = np.full((len(quaternions), 3), np.nan)
-    if is_known.any():
-        rotations = Rotation.from_quat(quaternions[is_known][:, [1, 2, 3, 0]])
-        vectors[is_known] = (rotations * rotations[0].inv()).as_rotvec()
+    known = np.flatnonzero(np.isfinite(quaternions).all(axis=1))
+    if not len(known):
+        return np.full((len(quaternions), 3), np.nan)
+    start = quaternions[known[0]] if reference is None else np.array(reference, dtype=float)
+    return rotations_between(np.broadcast_to(start, quaternions.shape), quaternions)
+
+
+def rotations_between(start: Array, end: Array) -> Array:
+    """Rotation vectors (N, 3), in rad and the world's axes, from unit quaternions (N, 4) to others; NaN where either is."""
+    vectors = np.full((len(end), 3), np.nan)
+    known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
+    if np.any(known):
+        first, second = (Rotation.from_quat(np.roll(each[known], -1, axis=1)) for each in (start, end))
+        vectors[known] = (second * first.inv()).as_rotvec()
     return vectors
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.rotation import Quaternion
 
 from ..cosimulation.robot_cosimulation import CosimulationResult
-from ..estimation.measured_outputs import rotation_vectors
 from ..estimation.trace_result import Comparison, Trace
 from ..provenance import Provenance
+from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..robot.schema import AXES
 
