@@ -41,8 +41,8 @@ def test_simulate_writes_the_orientation_and_tells_that_of_the_start(
     assert orientation[0] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-6)
     assert np.max(np.abs(orientation[-1, 1:])) > 1e-3
     channels = Page(page.read_text(encoding="utf-8")).data()["choices"][0]["channels"]
-    shown = [(each["label"], each["unit"]) for each in channels if each["title"] == "Orientation"]
-    assert shown == [(part, "") for part in "wxyz"]
+    shown = [(each["label"], each["unit"]) for each in channels if each["title"] == "Rotation"]
+    assert shown == [(f"about {axis}", "mrad") for axis in "xyz"]
     printed = capsys.readouterr()
     assert "suspended: starts 1.15 degrees from the declared orientation" in printed.err
     assert "trace" not in printed.out + printed.err

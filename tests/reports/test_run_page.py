@@ -193,18 +193,17 @@ def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
     assert len(drawn) == len(unpack_float32(position["time"]))
 
 
-def test_angular_velocities_are_in_mrad_per_second_and_quaternions_without_a_unit() -> None:
+def test_angular_velocities_are_in_mrad_per_second() -> None:
     run = made_rigid_run(example("cogiro"), 200)
     channels = Page(run_page(run, {})).data()["choices"][0]["channels"]
-    units = {each["title"]: each["unit"] for each in channels}
-    assert (units["Angular velocity"], units["Orientation"]) == ("mrad/s", "")
     (drawn,) = (each for each in channels if (each["title"], each["label"]) == ("Angular velocity", "y"))
+    assert drawn["unit"] == "mrad/s"
     expected = 1e3 * run.overview.rows[:, run.columns.index("wy")]
     assert unpack_float32(drawn["values"]) == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.parametrize("samples", [1601, 4001])
-def test_recorded_orientation_is_drawn_with_the_angle_between_it_and_the_co_simulated_one(samples: int) -> None:
+def test_rotation_is_drawn_about_each_axis_with_that_between_recorded_and_co_simulated(samples: int) -> None:
     """By a tracker slower than the log that writes the other sign; of a long run only each second row is kept."""
     run = made_rigid_run(suspended_robot(6), samples)
     parts = [run.columns.index(f"q{part}") for part in "wxyz"]
@@ -213,18 +212,35 @@ def test_recorded_orientation_is_drawn_with_the_angle_between_it_and_the_co_simu
         row = run.overview.last_row.copy()
         row[parts] = orientation
         overview.add(float(run.recording.time[sample]), row)
-    turned = rotation_of(exact) * Rotation.from_rotvec((0.0, 0.002, 0.0))
+    turned = Rotation.from_rotvec((0.0, 0.002, 0.0)) * rotation_of(exact)
     slow = np.where(np.arange(samples)[:, None] % 4 != 1, np.nan, -quaternions_of(turned))
     page = Page(run_page(replace(run, overview=overview, recording=replace(run.recording, orientation=slow)), {}))
-    channels = [each for each in page.data()["choices"][0]["channels"] if each["title"] == "Orientation"]
-    for channel, expected in zip(channels, overview.rows[:, parts].T, strict=True):
-        drawn, angles = (unpack_float32(channel[name]["values"]) for name in ("recorded", "difference"))
-        assert np.isfinite(drawn).mean() > 0.99 and np.nanmin(drawn) == pytest.approx(expected.min(), abs=5e-3)
+    channels = [each for each in page.data()["choices"][0]["channels"] if each["title"] == "Rotation"]
+    assert [(each["label"], each["unit"]) for each in channels] == [(f"about {axis}", "mrad") for axis in "xyz"]
+    vectors = 1e3 * (rotation_of(exact) * rotation_of(exact[:1]).inv()).as_rotvec()
+    for channel, expected, offset in zip(channels, vectors.T, (0.0, 2.0, 0.0), strict=True):
+        drawn, recorded, differences = (
+            unpack_float32(each["values"]) for each in (channel, channel["recorded"], channel["difference"])
+        )
+        assert (drawn.min(), drawn.max()) == pytest.approx((expected.min(), expected.max()), abs=1e-2)
+        assert np.isfinite(recorded).mean() > 0.99
+        assert np.nanmin(recorded) == pytest.approx(expected.min() + offset, abs=0.5)
         assert channel["difference"]["unit"] == "mrad"
-        assert float(channel["difference"]["apart"]) == pytest.approx(2.0, rel=0.05)
-        assert np.nanmax(np.abs(angles - 2.0)) < 0.5
-    assert page.text.count("Of orientations: the angle between both.") == 2
-    assert "Of orientations" not in Page(run_page(made_run(samples=200), {})).text
+        assert np.nanmax(np.abs(differences - offset)) < 0.5
+        assert float(channel["difference"]["apart"]) == pytest.approx(offset, rel=0.05, abs=0.2)
+    assert page.text.count("that from the co-simulated to the recorded orientation") == 2
+    assert "rotation vector" in page.text and "rotation" not in Page(run_page(made_run(samples=200), {})).text.lower()
+
+
+def test_platform_whose_fmu_shows_no_whole_orientation_has_no_rotation() -> None:
+    run = made_rigid_run(suspended_robot(6), 200)
+    kept = [index for index, name in enumerate(run.columns) if name != "qw"]
+    overview = RunOverview()
+    for time, row in zip(run.overview.time, run.overview.rows, strict=True):
+        overview.add(float(time), row[kept])
+    page = Page(run_page(replace(run, columns=tuple(run.columns[k] for k in kept), overview=overview), {}))
+    titles = {each["title"] for each in page.data()["choices"][0]["channels"]}
+    assert "Angular velocity" in titles and not titles & {"Orientation", "Rotation"}
 
 
 @pytest.mark.parametrize("robot", [example("cogiro"), suspended_robot(12)], ids=lambda each: each.name)

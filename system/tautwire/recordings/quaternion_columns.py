@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..robot.schema import QUATERNION_COLUMNS
+from .sensor_gaps import bridge_short_gaps
 
 Array = NDArray[np.float64]
 
@@ -57,6 +58,11 @@ def unit_quaternions(recorded: Array) -> Array:
     return unit
 
 
+def bridged_quaternions(time: Array, quaternions: Array) -> Array:
+    """Unit quaternions (N, 4), between the samples of a tracker slower than the log too."""
+    return unit_quaternions(bridge_short_gaps(time, quaternions))
+
+
 def with_continuous_signs(recorded: Array) -> Array:
     """Quaternions (N, 4), each with the sign that brings it nearest to the last one before it that was measured."""
     is_known = np.isfinite(recorded).all(axis=1)
@@ -81,7 +87,7 @@ def rotation_vectors(quaternions: Array, reference: Sequence[float] | None = Non
 
 
 def rotations_between(start: Array, end: Array) -> Array:
-    """Rotation vectors (N, 3), in rad and the world's axes, from unit quaternions (N, 4) to others; NaN where either is."""
+    """Rotation vectors (N, 3), in rad and the world's axes, between unit quaternions (N, 4); NaN where either is."""
     vectors = np.full((len(end), 3), np.nan)
     known = np.isfinite(start).all(axis=1) & np.isfinite(end).all(axis=1)
     if np.any(known):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..number_format import format_significant
 from ..recordings.geometry_reading import GeometryReading, recorded_poses
-from ..recordings.quaternion_columns import unit_quaternions
+from ..recordings.quaternion_columns import bridged_quaternions
 from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import Robot
@@ -72,15 +72,10 @@ def robot_scene(robot: Robot, recording: Recording | None) -> RobotScene:
     rows = frame_indices(recording.sample_count, 1, robot.cable_count, robot.platform.is_rigid_body)
     position = GeometryReading().positions(robot, recorded_poses(recording))
     platform = bridge_short_gaps(recording.time, position)[rows]
-    turned = bridged_orientation(recording)[rows]
+    turned = bridged_quaternions(recording.time, recording.orientation)[rows]
     path = ScenePath("recorded", platform, "accent", 5)
     attachments = body_attachments(robot, platform, turned if recording.has_orientation else None)
     return RobotScene(recording.time[rows], platform, recording.tension[rows], (path,), attachments=attachments)
-
-
-def bridged_orientation(recording: Recording) -> Array:
-    """Recorded unit quaternions (N, 4), between the samples of a tracker slower than the log too."""
-    return unit_quaternions(bridge_short_gaps(recording.time, recording.orientation))
 
 
 def _curve_data(curve: CheckCurve, points: int) -> dict[str, Any]:

@@ -13,12 +13,12 @@ from ..provenance import Provenance
 from ..recordings.alternative_readings import WindingReading
 from ..recordings.geometry_reading import GeometryReading
 from ..recordings.motion_regression import LengthRegression, length_regression
-from ..recordings.quaternion_columns import rotation_vectors
+from ..recordings.quaternion_columns import bridged_quaternions, rotation_vectors
 from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps, slower_rate
 from ..recordings.weight_balance import ForceBalance, force_balance
 from ..robot.schema import AXES, QUATERNION_COLUMNS, Robot
-from .check_figures import CheckCurve, CheckPanel, bridged_orientation, panel_data, robot_scene
+from .check_figures import CheckCurve, CheckPanel, panel_data, robot_scene
 from .page_rendering import Number, PageHeader, Row, render_page
 from .robot_scene import MAGNIFICATIONS, scene_data
 
@@ -122,7 +122,7 @@ def _length_panels(regression: LengthRegression) -> list[CheckPanel]:
 def _orientation_panels(recording: Recording) -> list[CheckPanel]:
     if not recording.has_orientation:
         return []
-    vectors = 1e3 * rotation_vectors(bridged_orientation(recording))
+    vectors = 1e3 * rotation_vectors(bridged_quaternions(recording.time, recording.orientation))
     is_measured = np.isfinite(recording.orientation).all(axis=1)
     return [
         CheckPanel(

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..cosimulation.robot_wiring import ORIENTATION_AXES
-from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant, page_unit
-from ..recordings.quaternion_columns import unit_quaternions
+from ..number_format import INTEGER_DIGITS, PAGE_UNITS, choose_unit, digits_for_range, format_significant
+from ..recordings.quaternion_columns import bridged_quaternions, rotation_vectors, rotations_between
 from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import AXES
 from .downsampling import envelope_times, min_max_envelope, pack_float32
@@ -36,21 +36,24 @@ MAX_SERIES_NUMBERS = 90_000  # in all curves of a page, times included, which so
 MAX_SERIES_POINTS, MIN_SERIES_POINTS = 3000, 300  # per curve
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OutputSeries:
-    """One output of a run over time: its column, its labels, and its recorded values.
+    """One output of a run over time, in SI units: its labels, its curve, its ends, and its recorded values.
 
-    ``scale`` turns SI into ``unit``; values are printed to so many significant ``digits``. ``recorded`` (N,) is over
-    the recording's time, None where it has none; ``difference`` (M,) is recorded minus co-simulated at the overview's
-    first M rows, in SI; of each part of a quaternion it is the angle between both orientations.
+    ``time`` and ``values`` (G,) are drawn; ``ends`` are the first, last, lowest and highest value. ``scale`` turns SI
+    into ``unit``; values are printed to so many significant ``digits``. ``recorded`` (N,) is over the recording's time,
+    None where it has none; ``difference`` (M,) is recorded minus co-simulated at the overview's first M rows, and of
+    orientations the rotation from the co-simulated to the recorded one.
     """
 
-    column_index: int
     title: str
     label: str
     unit: str
     scale: float
     digits: int
+    time: Array
+    values: Array
+    ends: tuple[float, float, float, float]
     recorded: Array | None
     difference: Array
 
@@ -61,15 +64,8 @@ class OutputSeries:
         return float(np.sqrt(np.mean(finite**2))) if finite.size else math.nan
 
     @property
-    def is_orientation(self) -> bool:
-        """Whether this is a part of a quaternion."""
-        return self.title == "Orientation"
-
-    @property
     def difference_unit(self) -> tuple[str, float]:
         """The display unit of the difference, and its size in SI units."""
-        if self.is_orientation:
-            return page_unit("rad")
         if self.unit in FIXED_UNITS:
             return self.unit, FIXED_UNITS[self.unit]
         magnitudes = np.abs(self.difference[np.isfinite(self.difference)])
@@ -82,25 +78,25 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
     positions: Mapping[str, Array] = dict(zip(AXES, recording.position.T, strict=True))
     tensions: Mapping[str, Array] = {str(i): recording.tension[:, i - 1] for i in cables}
     speeds: Mapping[str, Array] = {str(i): recording.winch_speed[:, i - 1] for i in cables}
-    orientations, angles = _recorded_orientation(run)
     quantities: tuple[tuple[str, str, Sequence[object], str, float, Mapping[str, Array]], ...] = (
         ("Position", "", AXES, "mm", 1e3, positions),
         ("Tension", "tension_", cables, "N", 1.0, tensions),
         ("Velocity", "v", AXES, "m/s", 1.0, {}),
-        ("Orientation", "q", ORIENTATION_AXES, "", 1.0, orientations),
         ("Angular velocity", "w", AXES, "mrad/s", 1e3, {}),
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
     )
-    series, (low, high) = [], run.overview.extremes()
+    series, extremes = [], np.array(run.overview.extremes())
     for title, prefix, names, unit, scale, recorded in quantities:
+        if title == "Angular velocity":
+            series += _rotation_series(run)
         for index, name in run.column_indices(prefix, names).items():
             label = f"cable {name}" if names is cables else name
-            is_pose = title in ("Position", "Orientation")
-            digits = digits_for_range(float(low[index]), float(high[index])) if is_pose else 4
-            measured, difference = _compared(run, index, recorded.get(name))
-            difference = angles if recorded is orientations and measured is not None else difference
-            series.append(OutputSeries(index, title, label, unit, scale, digits, measured, difference))
+            low, high = (float(each) for each in extremes[:, index])
+            digits = digits_for_range(low, high) if title == "Position" else INTEGER_DIGITS
+            ends = (float(run.overview.rows[0, index]), float(run.overview.last_row[index]), low, high)
+            curve, compared = run.overview.curve(index), _compared(run, index, recorded.get(name))
+            series.append(OutputSeries(title, label, unit, scale, digits, *curve, ends, *compared))
     return series
 
 
@@ -121,22 +117,31 @@ def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]
     }
 
 
-def _recorded_orientation(run: ReportedRun) -> tuple[Mapping[str, Array], Array]:
-    """Recorded quaternions by their parts, with the signs of the co-simulated ones, and the angles between both, (M,).
+def _rotation_series(run: ReportedRun) -> list[OutputSeries]:
+    """The rotation about each axis from the orientation in which the run starts; none where an FMU does not output it.
 
-    Angles are in rad, at the overview's first M rows.
+    At the first rows of the overview's groups, as the extremes of a quaternion's parts are no orientation.
     """
     overview, recording = run.overview, run.recording
-    rows = _columns_by_name(overview.rows, run.column_indices("q", ORIENTATION_AXES), ORIENTATION_AXES)
-    simulated = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    nearest = np.minimum(np.arange(recording.sample_count) // overview.group_size, len(rows) - 1)
-    is_opposite = np.sum(recording.orientation * simulated[nearest], axis=1, keepdims=True) < 0.0
-    recorded = np.where(is_opposite, -recording.orientation, recording.orientation)
-    bridged = unit_quaternions(bridge_short_gaps(recording.time, recorded))[:: overview.group_size]
-    count = min(len(bridged), len(simulated))
-    # By the chord, which is exact for small angles too; both signs of a quaternion are one orientation.
-    chords = [np.linalg.norm(bridged[:count] - sign * simulated[:count], axis=1) for sign in (1.0, -1.0)]
-    return dict(zip(ORIENTATION_AXES, recorded.T, strict=True)), 4.0 * np.arcsin(0.5 * np.minimum(*chords))
+    parts = list(run.column_indices("q", ORIENTATION_AXES))
+    if len(parts) < len(ORIENTATION_AXES):
+        return []
+    time, rows = overview.time, overview.rows
+    if overview.last_time > time[-1]:
+        time, rows = np.append(time, overview.last_time), np.vstack([rows, overview.last_row])
+    simulated = rows[:, parts] / np.linalg.norm(rows[:, parts], axis=1, keepdims=True)
+    bridged = bridged_quaternions(recording.time, recording.orientation)
+    thinned = bridged[:: overview.group_size]
+    count = min(len(thinned), len(overview.rows))
+    vectors, recorded = (rotation_vectors(each, simulated[0]) for each in (simulated, bridged))
+    differences = rotations_between(simulated[:count], thinned[:count])
+    series = []
+    for axis, values, measured, difference in zip(AXES, vectors.T, recorded.T, differences.T, strict=True):
+        ends = (float(values[0]), float(values[-1]), float(np.nanmin(values)), float(np.nanmax(values)))
+        compared = (measured, difference) if np.isfinite(measured).any() else (None, np.zeros(0))
+        labels = ("Rotation", f"about {axis}", "mrad", 1e3, INTEGER_DIGITS)
+        series.append(OutputSeries(*labels, time, values, ends, *compared))
+    return series
 
 
 def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tuple[Array | None, Array]:
@@ -152,7 +157,6 @@ def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tu
 
 def _series_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[str, Any]:
     """An output over time, and its recorded values until the run ended, of at most ``points`` points each."""
-    time, values = run.overview.curve(series.column_index)
     description: dict[str, Any] = {
         "label": series.label,
         "title": series.title,
@@ -160,9 +164,9 @@ def _series_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[st
         "digits": series.digits,
     }
     curve = {
-        "time": pack_float32(envelope_times(time, points)),
-        "values": pack_float32(series.scale * min_max_envelope(values, points)),
-        "range": _range_texts(series.scale * values, series.digits),
+        "time": pack_float32(envelope_times(series.time, points)),
+        "values": pack_float32(series.scale * min_max_envelope(series.values, points)),
+        "range": _range_texts(series.scale * series.values, series.digits),
     }
     if series.recorded is None:
         return {**description, **curve, "recorded": None, "difference": None}
@@ -186,7 +190,7 @@ def _difference_data(run: ReportedRun, series: OutputSeries, points: int) -> dic
         "values": pack_float32(min_max_envelope(bridge_short_gaps(time, series.difference) / unit_size, points)),
         "apart": format_significant(series.rms_difference / unit_size),
         "unit": unit,
-        "name": "angle between recorded and co-simulated" if series.is_orientation else "recorded minus co-simulated",
+        "name": "recorded minus co-simulated",
     }
 
 

@@ -50,7 +50,7 @@ def run_page(run: ReportedRun, links: Mapping[str, str], provenance: Provenance 
     title, subject = f"{run.robot.name}: {headline}", f"{run.robot.name}, {run.robot.cable_count} cables"
     header = PageHeader("Tautwire run", subject, headline, title, *_verdict(run), links, provenance)
     statistics = None if run.statistics is None else _statistics_texts(run.statistics)
-    quantities = _quantities(run, lines)
+    quantities = _quantities(lines)
     return render_page(
         "run", header, run_data(run, lines), run=run, statistics=statistics, quantities=quantities, notes=run.notes
     )
@@ -97,10 +97,8 @@ def _run_sentence(run: ReportedRun) -> str:
     return f"{sentence}."
 
 
-def _quantities(run: ReportedRun, lines: Sequence[OutputSeries]) -> list[QuantityView]:
+def _quantities(lines: Sequence[OutputSeries]) -> list[QuantityView]:
     """The outputs of each quantity, with the rms difference only where something of the quantity was recorded."""
-    low, high = run.overview.extremes()
-    ends = (run.overview.rows[0], run.overview.last_row, low, high)
     views = []
     for title in dict.fromkeys(line.title for line in lines):
         channels = [(index, line) for index, line in enumerate(lines) if line.title == title]
@@ -108,7 +106,7 @@ def _quantities(run: ReportedRun, lines: Sequence[OutputSeries]) -> list[Quantit
         rows: list[Row] = [
             [
                 line.label,
-                *(_value_cell(line, end[line.column_index]) for end in ends),
+                *(_value_cell(line, end) for end in line.ends),
                 *([_rms_cell(line)] if has_recorded else []),
             ]
             for _, line in channels
@@ -123,7 +121,7 @@ def _rms_cell(line: OutputSeries) -> Number:
 
 
 def _value_cell(line: OutputSeries, value: float) -> Number:
-    return Number(format_significant(line.scale * float(value), line.digits), line.unit)
+    return Number(format_significant(line.scale * value, line.digits), line.unit)
 
 
 MIN_ROWS = 2

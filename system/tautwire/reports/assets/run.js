@@ -6,11 +6,10 @@ function outputPanel(choice, place, isTall) {
   if (channel.range.length === 0) return { numbers: "", words: `${what}: no finite value.`, empty: "No finite value" };
   const colour = colours();
   const [low, high] = channel.range;
-  // Quaternions have no unit.
-  const unit = channel.unit && ` ${channel.unit}`;
+  const unit = ` ${channel.unit}`;
   const hover = { hovertemplate: `%{y:.${channel.digits}~r}${unit}` };
   const traces = [lineTrace("co-simulated", channel.time, channel.values, colour.accent, hover)];
-  const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit || "1") };
+  const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
   let words = `${what}: from ${low} to ${high}${unit}`;
   if (channel.recorded) {
     const { time, values } = channel.recorded;
