@@ -313,6 +313,16 @@ def test_a_tracker_that_is_slower_than_the_load_cells_serves() -> None:
     assert check is not None and any("are in kN" in mistake.cause for (mistake,) in check.mistakes)
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_unit_of_load_cells_slower_than_the_blocks_is_told(name: str) -> None:
+    robot, recording = shipped(name)
+    is_sample = np.arange(recording.sample_count)[:, None] % 50 == 0
+    slow = replace(recording, tension=np.where(is_sample, recording.tension, np.nan))
+    assert not recording_mistakes(robot, slow)
+    (error,) = recording_mistakes(robot, tensions(slow, 1e-3))
+    assert "are in kN" in error.problem
+
+
 def test_blocks_that_span_a_gap_do_not_count() -> None:
     robot, recording = shipped("three")
     time = recording.time + 30.0 * (recording.time > recording.time[recording.sample_count // 2])

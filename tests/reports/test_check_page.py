@@ -123,6 +123,23 @@ def test_the_path_of_a_tracker_slower_than_the_log_is_drawn_through_its_points(t
         assert z[10] == pytest.approx((recorded["z"][8] + recorded["z"][12]) / 2, rel=1e-6)
 
 
+def test_load_cells_slower_than_the_blocks_of_the_balance_are_drawn_through_their_samples(
+    fit_page: Page, tmp_path: Path
+) -> None:
+    recorded, slow = pd.read_csv(FIT), tmp_path / "slow.csv"
+    recorded.loc[recorded.index % 50 != 0, ["tension_1", "tension_2", "tension_3"]] = np.nan
+    recorded.to_csv(slow, index=False)
+    slow_page = report_of(tmp_path, slow, 0)
+    measured, exact = (
+        [unpack_float32(each["curves"][0]["y"]) for each in channels if each["title"] == "Tension"]
+        for channels in (page.data()["choices"][0]["channels"] for page in (slow_page, fit_page))
+    )
+    assert len(measured) == 3
+    for drawn, whole in zip(measured, exact, strict=True):
+        assert len(drawn) > 0.9 * len(whole)
+        assert np.corrcoef(drawn, whole[: len(drawn)])[0, 1] > 0.7
+
+
 def table_of_columns(page: Path) -> dict[str, list[str]]:
     """Unit, minimum, maximum, rate and missing share by column."""
     table = page.read_text(encoding="utf-8").partition('<section id="read"')[2].partition("</table>")[0]

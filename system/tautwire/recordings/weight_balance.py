@@ -120,14 +120,12 @@ def _block_means(
         return None
     starts = recording.time[: count * size : size] * TIME_UNITS[winding.time_unit]
     spans_gap = np.append(np.diff(starts) > MAX_BLOCK_STRETCH * size * interval, False)
-    # Of positions in some rows alone the mean would not be that of the block's middle, which a second difference needs.
+    # Of a sensor slower than the log the mean of its samples would not be that of the block's middle, which a second
+    # difference needs; one slower than the blocks would leave some without a sample.
     used = slice(count * size)
     means = []
-    poses = (
-        bridge_short_gaps(recording.time[used], each[used]) for each in (recording.position, recording.orientation)
-    )
-    for values in (*poses, recording.tension[used]):
-        blocks = values.reshape(count, size, -1)
+    for values in (recording.position, recording.orientation, recording.tension):
+        blocks = bridge_short_gaps(recording.time[used], values[used]).reshape(count, size, -1)
         counts = np.isfinite(blocks).sum(axis=1)
         mean = np.nansum(blocks, axis=1) / np.where(counts > 0, counts, np.nan)
         means.append(np.where(spans_gap[:, None], np.nan, mean))
