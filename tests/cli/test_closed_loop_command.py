@@ -81,6 +81,17 @@ def test_files_without_a_controller_are_refused(
     assert not out.exists()
 
 
+def test_a_function_that_raises_leaves_the_run_until_then(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    law, path, out = tmp_path / "law.py", tmp_path / "path.toml", tmp_path / "result.csv"
+    law.write_text(FUNCTION.replace("    return", "    1 / (time < 0.045)\n    return"), encoding="utf-8")
+    path.write_text(PATH, encoding="utf-8")
+    arguments = ["simulate", ROBOT, "--controller", str(law), "--path", str(path), "--out", str(out)]
+    assert run(arguments) == 1
+    said = capsys.readouterr().err
+    assert "raised ZeroDivisionError" in said and "at 0.05 s" in said and "the run up to then is in" in said
+    assert pd.read_csv(out)["time"].to_numpy() == pytest.approx(np.arange(7) * 0.01)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [

@@ -248,13 +248,20 @@ def test_state_spaces_that_do_not_fit_are_refused(fmus: RobotFmus, system: Any, 
     ],
 )
 @pytest.mark.parametrize("patience", [None, 60.0])
-def test_functions_that_fail_say_when(
+def test_functions_that_fail_say_when_and_leave_the_run_until_then(
     fmus: RobotFmus, speeds: Any, words: tuple[str, ...], patience: float | None
 ) -> None:
-    with pytest.raises(ControllerError) as caught:
+    with pytest.raises(RunError) as caught:
         closed_loop(fmus, speeds, patience=patience)
     assert all(word in str(caught.value) for word in words), caught.value
     assert "measured [28.8" in str(caught.value)
+    cause = caught.value.cause
+    assert isinstance(cause, ControllerError)
+    whole = closed_loop(fmus, lambda time, measured: np.zeros(3))
+    count = len(caught.value.result.time)
+    # One sample of computing delay: the speeds of sample k are computed once sample k + 1 is recorded.
+    assert count == round(cause.time / 0.01) + 2
+    assert caught.value.result.position == pytest.approx(whole.position[:count], abs=1e-9)
 
 
 def test_fmus_that_do_not_fit_are_refused(fmus: RobotFmus, tmp_path: Path) -> None:

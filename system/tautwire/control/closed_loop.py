@@ -108,11 +108,11 @@ def cosimulate_closed_loop(
     ``robot`` is the controller's model. Returns the run at the controller's samples. With winches the controller's
     speeds are their commands.
 
-    Raises ControllerError where a function raises, UnreachableError where the path requires a cable to push,
-    StretchError where no speeds follow it, RunError where an FMU fails or a controller hangs, ControllerFmuError where
-    a controller FMU does not fit, InputError where an FMU lacks a measured output or robot, controller and FMUs do not
-    match, SlotError where a load is on a user's platform without an input for it, ArgumentError for an invalid
-    argument.
+    Raises RunError, which has the run until then, where an FMU or a controller fails or hangs (of a function that
+    fails, its ``cause`` is a ControllerError), UnreachableError where the path requires a cable to push, StretchError
+    where no speeds follow it, ControllerFmuError where a controller FMU does not fit, InputError where an FMU lacks a
+    measured output or robot, controller and FMUs do not match, SlotError where a load is on a user's platform without
+    an input for it, ArgumentError for an invalid argument.
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)

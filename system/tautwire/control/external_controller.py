@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 from tautwire_fmu.laws import sampled_control as law
 from tautwire_fmu.laws.sampled_control import ControllerState
 
-from ..errors import ArgumentError, TautwireError, describe_value, one_line
+from ..cosimulation import InputSourceError
+from ..errors import ArgumentError, describe_value, one_line
 from ..name_suggestions import suggest_name
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
@@ -38,7 +39,7 @@ PERIOD_TOLERANCE = 1e-9
 DISCRETISATIONS = ("tustin", "zoh")
 
 
-class ControllerError(TautwireError):
+class ControllerError(InputSourceError):
     """A controller failed at ``time`` (s), from ``measured``, pose and tensions; ``problem`` says how."""
 
     def __init__(self, time: float, measured: Sequence[float], problem: str) -> None:
@@ -122,8 +123,9 @@ def function_controller(function: SpeedLaw, cable_count: int, aim: ControlAim | 
 
     ``time`` in s; ``measured`` (3 + n,): x, y, z in m, then the tensions in N; of a platform that turns (7 + n,), with
     its unit quaternion w, x, y, z behind the position. ``speeds`` (n,) of the winches in m/s,
-    positive reels in; not deviations. Limits are those of ``aim`` and the robot file. A run raises ControllerError
-    where the function raises an exception, or returns other than n finite numbers.
+    positive reels in; not deviations. Limits are those of ``aim`` and the robot file. Where the function raises an
+    exception, or returns other than n finite numbers, a run raises RunError, which has the run until then and as its
+    ``cause`` a ControllerError.
 
     Raises ArgumentError where it is not a function.
     """

@@ -9,7 +9,16 @@ from .coupling_solver import CouplingSolver, SolverOptions
 from .isolation import CALL_TIMEOUT, CallAbortedError, RunAbortedError, simulate_isolated
 from .run_statistics import RunStatistics
 from .step_size_control import AdaptiveStep, FixedStep, StepSizeControl, StepSizeError
-from .time_loop import Experiment, InputSource, MemoryRecorder, PiecewiseLinearInput, Progress, Recorder, simulate
+from .time_loop import (
+    Experiment,
+    InputSource,
+    InputSourceError,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    Progress,
+    Recorder,
+    simulate,
+)
 
 __all__ = [
     "CALL_TIMEOUT",
@@ -24,6 +33,7 @@ __all__ = [
     "Experiment",
     "FixedStep",
     "InputSource",
+    "InputSourceError",
     "JournalledComponent",
     "MemoryRecorder",
     "PiecewiseLinearInput",

@@ -29,6 +29,7 @@ from . import (
     Experiment,
     FixedStep,
     InputSource,
+    InputSourceError,
     JournalledComponent,
     MemoryRecorder,
     PiecewiseLinearInput,
@@ -105,9 +106,9 @@ class CosimulationResult:
 
 
 class RunError(TautwireError):
-    """An FMU failed in a run, or what computes its inputs hung or crashed; ``result`` is the run until then."""
+    """An FMU failed in a run, or what computes its inputs did, hung or crashed; ``result`` is the run until then."""
 
-    def __init__(self, cause: ComponentError | RunAbortedError, result: CosimulationResult) -> None:
+    def __init__(self, cause: ComponentError | InputSourceError | RunAbortedError, result: CosimulationResult) -> None:
         self.cause = cause
         self.result = result
         super().__init__(str(cause))
@@ -240,13 +241,14 @@ def run_cosimulation(
 
     ``call_timeout`` and ``additional`` are as for :func:`record_cosimulation`.
 
-    Raises RunError, which has the run until then, where an FMU fails, or the source hangs or crashes.
+    Raises RunError, which has the run until then, where an FMU or the source fails, or the source hangs or
+    crashes.
     """
     wiring, time = wire_fmus(fmus), experiment.times
     recorder = MemoryRecorder(len(time), len(wiring.outputs))
     try:
         statistics = record_cosimulation(fmus, experiment, recorder, progress, call_timeout, additional)
-    except (ComponentError, RunAbortedError) as error:
+    except (ComponentError, InputSourceError, RunAbortedError) as error:
         raise RunError(error, result_from_rows(time[: recorder.count], recorder.rows, fmus, wiring)) from error
     return replace(result_from_rows(time, recorder.rows, fmus, wiring), statistics=statistics)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from ..errors import TautwireError
 from ..fmus.component import Component, VariableBlock
 from ..fmus.fmu_variables import Port
 from ..fmus.variable_units import definition_from_exponents, same_unit
@@ -22,6 +23,10 @@ Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 METRE = ("m", definition_from_exponents({"m": 1}))
+
+
+class InputSourceError(TautwireError):
+    """What computes the external inputs failed; the message says when and why."""
 
 
 class InputSource(Protocol):
