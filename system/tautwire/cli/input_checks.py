@@ -22,7 +22,7 @@ from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..recordings.winch_columns import ESTIMATED_FACTOR
 from ..robot.implausible_units import implausible_units
-from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
+from ..robot.robot_file_reader import MIN_CABLES, read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
 from ..robot.uncertain_parameters import uncertain_parameters
@@ -35,7 +35,7 @@ MAX_COUNTED_ERRORS = 100_000
 # Finding the line of each problem takes time, so line numbers are left out where the file is long.
 MAX_ROBOT_FILE_PROBLEMS = 50
 MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
-MIN_CABLE_COUNT, MIN_RIGID_CABLE_COUNT = 3, 2
+
 # Keys that do not affect whether the cables hold the platform at the start.
 KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",), ("recording",)))
 
@@ -93,7 +93,7 @@ def check_files(
     robot = _check_robot_file(robot_file, problems, notes)
     if recording_file is None:
         return CheckResult(tuple(problems), tuple(notes), robot)
-    if robot is None or robot.cable_count < _min_cable_count(robot):
+    if robot is None or robot.cable_count < MIN_CABLES:
         notes.append(f"{recording_file} was not checked: the number of cables is unknown")
         return CheckResult(tuple(problems), tuple(notes), robot)
     recording_problems: list[Problem] = []
@@ -111,10 +111,6 @@ def check_files(
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
     return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
-
-
-def _min_cable_count(robot: Robot) -> int:
-    return MIN_RIGID_CABLE_COUNT if robot.platform.is_rigid_body else MIN_CABLE_COUNT
 
 
 def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:

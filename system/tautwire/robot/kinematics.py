@@ -112,9 +112,9 @@ def forward_kinematics(
     freedoms = 6 if is_rigid else 3
     if robot.cable_count < freedoms:
         problem = f"of {robot.cable_count} cables do not determine {freedoms} degrees of freedom"
-        raise ArgumentError(
-            "forward_kinematics: lengths", lengths, problem, "use forward_kinematics_of_ropes, where statics decides"
-        )
+        of_ropes = "use forward_kinematics_of_ropes, where statics decides"
+        hint = of_ropes if is_rigid else "compute the lengths at positions, as static_pose does"
+        raise ArgumentError("forward_kinematics: lengths", lengths, problem, hint)
     at, quaternion = validated_pose("forward_kinematics", robot, position, orientation)
     scale, generator = float(np.mean(required)), np.random.default_rng(0)
     solutions: list[ForwardSolution] = []

@@ -20,7 +20,6 @@ from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas, require_positive_mass
 from .platform_reader import (
-    ADD_INERTIA,
     CABLE_KEYS,
     SENSOR_KEYS,
     read_platform,
@@ -55,7 +54,7 @@ TOP_LEVEL_KEYS = (
 )
 NATIVE_KEY = "native"
 MAX_FILE_BYTES = 10_000_000  # bytes
-MAX_CABLES = 100
+MIN_CABLES, MAX_CABLES = 2, 100
 MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
 
 GRAVITY_RULE = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
@@ -252,16 +251,14 @@ def _read_sensors(table: CheckedTable, is_rigid: bool) -> Sensors:
 def _read_cables(root: CheckedTable, platform: Platform) -> tuple[Cable, ...]:
     entries = root.content.get("cable", [])
     tables = root.tables("cable") if "cable" in root.content else ()
-    is_rigid = platform.is_rigid_body
-    if isinstance(entries, list) and len(entries) < (2 if is_rigid else 3):
-        problem = f"{len(entries)} given, a robot has {'two' if is_rigid else 'three'} or more"
-        hint = "add one table [[cable]] for each cable"
-        root.refuse("cable", problem, hint if is_rigid or len(entries) < 2 else f"{hint}, or {ADD_INERTIA}")
+    if isinstance(entries, list) and len(entries) < MIN_CABLES:
+        problem = f"{len(entries)} given, a robot has two or more"
+        root.refuse("cable", problem, "add one table [[cable]] for each cable")
     if len(tables) > MAX_CABLES:
         root.refuse("cable", f"{len(tables)} given, at most {MAX_CABLES} are read", "leave out the others")
         tables = tables[:MAX_CABLES]
     cables = tuple(_read_cable(table) for table in tables)
-    for table in () if is_rigid else tables:
+    for table in () if platform.is_rigid_body else tables:
         refuse_keys_of_rigid_bodies(table, CABLE_KEYS)
     _refuse_coincident_points(tables, cables, platform)
     return cables

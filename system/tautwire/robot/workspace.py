@@ -147,7 +147,8 @@ def _require_criterion(robot: Robot, grid: PoseGrid, criterion: str) -> None:
 
 def _require_enough_cables(robot: Robot, criterion: str) -> None:
     if robot.cable_count < degrees_of_freedom(robot):
-        problem = f"{robot.cable_count} cables cannot exert a moment of every direction: no pose is {criterion}"
+        part = "moment" if robot.platform.is_rigid_body else "force"
+        problem = f"{robot.cable_count} cables cannot exert a {part} of every direction: no pose is {criterion}"
         raise InputError(robot.name, problem, "compute the static workspace, with --criterion static")
 
 
