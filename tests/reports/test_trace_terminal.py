@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from tautwire.estimation.disturbance import NEUTRAL, OrnsteinUhlenbeck
-from tautwire.estimation.trace_result import Candidate, Estimate, Trace
+from tautwire.estimation.trace_result import Candidate, Estimate, FoundEffect, Trace
 from tautwire.number_format import (
     choose_unit,
     format_engineering,
@@ -38,6 +38,20 @@ def test_verdict_comes_first() -> None:
     text = rendered(made_trace())
     assert text.startswith("Effect found: The cables damp 5.3 times")
     assert "extended model is white noise" in " ".join(text.split())
+
+
+def test_headline_tells_the_values_of_the_largest_effect_with_their_intervals() -> None:
+    trace = made_trace()
+    told = "Fitted damping (all cables): damping 2.103 GPa s (95 % interval 2.050 to 2.160)."
+    assert " ".join(rendered(trace).split()).startswith(f"Effect found: {trace.sentence} {told}")
+    page = Page(trace_page(trace, {})).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert f"{trace.sentence} {told}" in page
+    ratio = Estimate(0.94, "1", 0.937, 0.943, None)
+    drum = FoundEffect("drum", "winch", (2,), {"radius_ratio": ratio}, 40.0, share=0.9)
+    damping = replace(trace.effects[0], share=0.05)
+    told = "Fitted drum (cable 2): radius_ratio 0.9400 (95 % interval 0.9370 to 0.9430)."
+    assert told in " ".join(rendered(replace(trace, effects=(damping, drum))).split())
+    assert "Fitted" not in rendered(nothing_found(trace)) + rendered(replace(trace, verdict="unexplained"))
 
 
 @pytest.mark.parametrize("eight", [False, True])
@@ -99,7 +113,9 @@ def test_long_parameter_lists_are_all_shown() -> None:
     parameters = {name: Estimate(1.23456e9, "Pa s", 1.2e9, 1.3e9, None) for name in names}
     text = rendered(replace(trace, effects=(replace(trace.effects[0], parameters=parameters, cables=(1, 2, 5, 7)),)))
     assert max(len(line) for line in text.splitlines()) <= 80
-    assert text.count("1.235") == 4 and text.count("GPa s") >= 4
+    table = text.partition("Found, with")[2]
+    assert table.count("1.235") == 4 and table.count("GPa s") >= 4
+    assert "and 2 more." in text.partition("Found, with")[0]
     assert "…" not in text
 
 

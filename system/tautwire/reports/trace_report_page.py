@@ -32,6 +32,7 @@ from .trace_texts import (
     explained_share,
     format_estimate,
     format_evidence,
+    headline,
     noise_sentence,
     output_groups,
     separating_commands,
@@ -62,7 +63,7 @@ def trace_page(trace: Trace, links: Mapping[str, str], provenance: Provenance | 
     robot, figures = trace.robot_before, trace_page_data(trace)
     subject, title = f"{robot.name}, {robot.cable_count} cables", f"{robot.name}: {trace.sentence}"
     verdict = VERDICTS[trace.verdict]
-    header = PageHeader("Tautwire trace", subject, trace.sentence, title, verdict, trace.verdict, links, provenance)
+    header = PageHeader("Tautwire trace", subject, headline(trace), title, verdict, trace.verdict, links, provenance)
     tables = {
         "total_errors": _total_error_rows(trace),
         "output_errors": _output_error_rows(trace),

@@ -26,6 +26,7 @@ from .trace_texts import (
     explained_share,
     format_estimate,
     format_evidence,
+    headline,
     noise_sentence,
     output_groups,
     separating_commands,
@@ -44,7 +45,7 @@ less simple: more parameters than the one taken, or offsets in place of one load
 def trace_table(trace: Trace) -> RenderableType:
     """The result of a trace, for a rich console."""
     blocks: list[RenderableType] = [
-        Text(f"{VERDICTS[trace.verdict]}: {one_line(trace.sentence)}", style="bold"),
+        Text(f"{VERDICTS[trace.verdict]}: {one_line(headline(trace))}", style="bold"),
         Text(noise_sentence(trace) + "\n"),
         _error_table(trace),
         _paragraph("Where, before any effect is fitted", [trace.components.sentence]),

@@ -25,6 +25,7 @@ MILLIMETRES_PER_METRE = 1e3
 MILLIRADIANS_PER_RADIAN = 1e3
 # An error below this multiple of the noise floor leaves nothing for a model to explain.
 NOISE_FLOOR_MARGIN = 1.05
+MAX_VALUES_IN_HEADLINE = 2
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,21 @@ def format_estimate(estimate: Estimate) -> EstimateText:
     texts, unit = format_in_common_unit(numbers, estimate.unit, (estimate.high - estimate.low) / 2.0)
     value, low, high, declared = texts
     return EstimateText(value, low, high, declared, unit)
+
+
+def headline(trace: Trace) -> str:
+    """The verdict's sentence, and behind it the fitted values of the largest effect with their 95 % intervals."""
+    if not trace.effects or trace.verdict not in ("effects", "discovered"):
+        return trace.sentence
+    largest = max(trace.effects, key=lambda each: (each.share or 0.0, each.evidence))
+    cables = f" ({cables_text(largest.cables, trace.robot_before.cable_count)})" if largest.cables else ""
+    values = []
+    for name, estimate in largest.parameters.items():
+        text = format_estimate(estimate)
+        values.append(f"{name} {text.value} {text.unit}".rstrip() + f" (95 % interval {text.low} to {text.high})")
+    hidden_count = len(values) - MAX_VALUES_IN_HEADLINE
+    more = f" and {hidden_count} more" if hidden_count > 0 else ""
+    return f"{trace.sentence} Fitted {largest.name}{cables}: {', '.join(values[:MAX_VALUES_IN_HEADLINE])}{more}."
 
 
 def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
