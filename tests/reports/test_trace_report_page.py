@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import gzip
+import io
 import json
+import math
 import re
 from dataclasses import replace
 from functools import cache
@@ -15,10 +17,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from markupsafe import escape
+from rich.console import Console
 
 from tautwire.estimation.trace_result import Correlation, FittedParameter, Identifiability, Trace
 from tautwire.provenance import PROVENANCE_KEY, Provenance
-from tautwire.reports import trace_document, trace_page, write_report
+from tautwire.reports import trace_document, trace_page, trace_table, write_report
 from tautwire.reports.downsampling import (
     envelope_times,
     min_max_envelope,
@@ -29,6 +32,7 @@ from tautwire.reports.downsampling import (
 )
 from tautwire.reports.robot_scene import deviation_magnification
 from tautwire.reports.trace_figures import MAX_CURVE_POINTS, trace_page_data
+from tautwire.reports.trace_texts import runner_up_text
 from tautwire.robot.robot_file_reader import read_robot
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
@@ -318,6 +322,23 @@ def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path)
     links = Page((tmp_path / "index.html").read_text(encoding="utf-8")).links()
     assert sorted(links) == sorted(path.name for path in tmp_path.iterdir() if path.name != "index.html")
     assert {path.name for path in (*fmus.cables, fmus.platform)} < set(links)
+
+
+def test_the_next_best_effect_stands_beside_the_one_that_was_taken() -> None:
+    trace = made_trace()
+    told = "modulus, all cables: 64.2 of 812.4"
+    page = Page(trace_page(trace, {}))
+    assert [each for each in page.all("td") if each.get("data-title") == "Next best"]
+    assert told in page.text.replace("\N{NO-BREAK SPACE}", " ")
+    console = Console(file=io.StringIO(), width=80)
+    console.print(trace_table(trace))
+    assert isinstance(console.file, io.StringIO)
+    assert f"damping: {told}" in console.file.getvalue()
+    alone = tuple(each for each in trace.candidates if each.name == "damping" or not math.isfinite(each.evidence))
+    assert not runner_up_text(replace(trace, candidates=alone), trace.effects[0])
+    on_other_cables = replace(trace.candidates[0], cables=(3,))
+    of_other = (on_other_cables, *trace.candidates[1:])
+    assert not runner_up_text(replace(trace, candidates=of_other), trace.effects[0])
 
 
 def test_correlated_estimates_are_listed() -> None:

@@ -35,6 +35,7 @@ from .trace_texts import (
     headline,
     noise_sentence,
     output_groups,
+    runner_up_text,
     separating_commands,
     undetectable_effects,
     values_text,
@@ -144,15 +145,15 @@ def _shared_scale(trace: Trace, output: MeasuredOutput) -> tuple[float, float]:
 
 def _effect_rows(trace: Trace, effect: FoundEffect) -> list[Row]:
     location = cables_text(effect.cables, trace.robot_before.cable_count) if effect.cables else effect.component
-    evidence = Number(format_evidence(effect.evidence))
+    evidence, runner_up = Number(format_evidence(effect.evidence)), runner_up_text(trace, effect) or ABSENT_TEXT
     rows: list[Row] = []
     for name, estimate in effect.parameters.items():
         text = format_estimate(estimate)
         chart = charts.whisker(estimate.value, estimate.low, estimate.high, estimate.declared)
         value, interval = Number(text.value, strong=True), Number(f"{text.low} to {text.high}")
         # Named once: each name is one effect, however many parameters it has.
-        names, evidence_once = (("", ""), "") if rows else ((effect.name, location), evidence)
-        rows.append([*names, name, value, interval, Number(text.declared), text.unit, chart, evidence_once])
+        names, once = (("", ""), ("", "")) if rows else ((effect.name, location), (evidence, runner_up))
+        rows.append([*names, name, value, interval, Number(text.declared), text.unit, chart, *once])
     return rows
 
 

@@ -10,7 +10,7 @@ from itertools import groupby
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..estimation.hypotheses import hypotheses
-from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, Trace
+from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, FoundEffect, Trace
 from ..number_format import ABSENT_TEXT, digits_beside, format_engineering, format_in_common_unit, format_significant
 from ..robot.schema import AXES, Robot
 
@@ -166,6 +166,33 @@ def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list
 
     ordered = sorted(candidates, key=sort_key)
     return [(number, list(group)) for number, group in groupby(ordered, key=lambda each: each.round)]
+
+
+def runner_up_text(trace: Trace, effect: FoundEffect) -> str:
+    """The best other effect of the round that took an effect, as in "modulus, all cables: 64.2 of 812.4".
+
+    Both numbers are evidence of that round, in nats. Blank where the round is not known, or has no fitted rival.
+    """
+    taken = next(
+        (
+            each
+            for each in trace.candidates
+            if each.accepted and each.name == effect.name and set(effect.cables) <= set(each.cables)
+        ),
+        None,
+    )
+    if taken is None:
+        return ""
+    rivals = [
+        each
+        for each in trace.candidates
+        if each.round == taken.round and each.name != effect.name and math.isfinite(each.evidence)
+    ]
+    if not rivals:
+        return ""
+    best = max(rivals, key=lambda each: each.evidence)
+    cables = f", {cables_text(best.cables, trace.robot_before.cable_count)}" if best.cables else ""
+    return f"{best.name}{cables}: {format_evidence(best.evidence)} of {format_evidence(taken.evidence)}"
 
 
 def candidate_status(candidate: Candidate, of_round: Sequence[Candidate]) -> str:
