@@ -49,7 +49,7 @@ winch_speed_noise = 1e-4          # m/s
 # tension_gain_uncertainty = 0.004    # of a load cell's gain about 1
 # position_offset_uncertainty = 1e-3  # m, constant error of the tracker, on each axis
 
-# One table for each cable, three or more. The law of tension is T = E S eps + c S deps/dt + T0.
+# One table for each cable, two or more. The law of tension is T = E S eps + c S deps/dt + T0.
 """
 TEMPLATE_CABLE = """
 [[cable]]  # cable {number}
