@@ -35,11 +35,12 @@ def test_pose_holds_the_weight_by_both_cables(tmp_path: Path, capsys: pytest.Cap
     assert json.loads(capsys.readouterr().out)["tensions"] == pytest.approx(tensions_by_moments(), rel=1e-9)
 
 
-def test_the_mode_across_the_plane_is_that_of_a_pendulum(tmp_path: Path) -> None:
+def test_the_mode_across_the_plane_is_that_of_a_pendulum(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plant = tmp_path / "plant.json"
     assert run(["linearise", robot_file(tmp_path), "--out", str(plant)]) == 0
     lowest = min(json.loads(plant.read_text())["frequencies_hz"])
     assert lowest == pytest.approx(np.sqrt(9.81 / (3.0 - 0.9)) / (2.0 * np.pi), rel=1e-6)
+    assert "damping ratio 0.00000" in capsys.readouterr().out
 
 
 def test_simulation_and_check_of_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -92,7 +92,9 @@ def linearise(
 
 
 def _mode_lines(plant: LinearPlant) -> list[str]:
-    pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
+    # Rounded first: an undamped mode has no negative zero.
+    ratios = [round(float(ratio), 5) + 0.0 for ratio in plant.modes.damping_ratios]
+    pairs = zip(plant.modes.frequencies, ratios, strict=True)
     return [f"mode {i}: {frequency:.4f} Hz, damping ratio {ratio:.5f}" for i, (frequency, ratio) in enumerate(pairs, 1)]
 
 
