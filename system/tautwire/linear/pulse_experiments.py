@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..cosimulation import CouplingGraph, CouplingSolver, Port, SolverOptions
 from ..errors import TautwireError
+from ..fmus.variable_units import nominal_of
 from ..process_signals import defer_interrupts
 
 Array = NDArray[np.float64]
@@ -113,7 +114,7 @@ class PulseExperiment:
 
     def _nominal_values(self, ports: Sequence[Port]) -> Array:
         variables = [self._coupling.graph.components[port.component].variables[port.variable] for port in ports]
-        return np.array([abs(float(variable.nominal or 1.0)) for variable in variables])
+        return np.array([nominal_of(variable) for variable in variables])
 
     def _rest_values(self, coupling: CouplingSolver) -> Array:
         return np.array([self._rest_inputs.get(port, 0.0) for port in coupling.graph.external_inputs])
