@@ -12,11 +12,12 @@ from ..errors import RecordingError
 from ..robot.recorded_columns import POSE_COLUMNS, TRACKER_TABLE
 from ..robot.schema import RecordedColumn, Robot
 from .alternative_readings import mistakes_text
+from .clock_fit import TrackerClock
 from .consistency import travel_error
 from .mistaken_tracker import frame_mistakes, tracker_mistakes
 from .quaternion_columns import unit_quaternions
 from .recording import Recording, read_tracker
-from .tracker_clock import TrackerClock, UnmatchedTravelError, estimate_tracker_clock
+from .tracker_clock import UnmatchedTravelError, estimate_tracker_clock
 
 Array = NDArray[np.float64]
 

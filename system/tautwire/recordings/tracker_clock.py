@@ -10,6 +10,7 @@ from scipy.signal import correlation_lags
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
+from .clock_fit import MIN_SAMPLES, Alignment, ClockFit, TrackerClock
 from .geometry_reading import GeometryReading, recorded_poses
 from .recording import Recording
 from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, travel_on_grid
@@ -23,13 +24,8 @@ MIN_MOTION_SHARE = 0.25
 MIN_MOTION_NOISE_RATIO = 20.0
 # Candidates whose coarse misfit is larger than the best by more are not refined.
 MAX_COARSE_DIFFERENCE = 0.3
-MAX_ITERATIONS, TOLERANCE = 15, 1e-6  # s
-MIN_SAMPLES, MAX_SAMPLES = 20, 20_000
 # The rms of lengths less travel over that of lengths: beyond the first it is another motion or another unit.
 MAX_MISFIT, EQUAL_RATIO, EQUAL_DIFFERENCE = 0.2, 1.5, 0.005
-OUTLIER_RATIO = 25.0  # of squares, to their median
-JACKKNIFE_BLOCKS = 10
-MIN_RATE_SIGMAS, MAX_RATE_ERROR = 3.0, 1e-2
 MAX_DEVIATION = 5e-3  # s
 
 STATE_OFFSET_HINT = "or state clock_offset in [recording.tracker]"
@@ -50,31 +46,6 @@ class UnmatchedTravelError(RecordingError):
         super().__init__(tracker.path, problem, hint)
 
 
-@dataclass(frozen=True)
-class TrackerClock:
-    """A tracker's clock: it shows ``offset + rate * (t - t_1)`` at the time t of the log, whose first sample is at t_1.
-
-    ``deviation`` is the standard deviation of the offset in the middle of the motion, in s; 0 where it is stated.
-    """
-
-    offset: float
-    rate: float = 1.0
-    deviation: float = 0.0
-
-    def log_times(self, tracker_times: Array, first_log_time: float) -> Array:
-        """Times on the log's clock."""
-        return first_log_time + (tracker_times - self.offset) / self.rate
-
-
-@dataclass(frozen=True)
-class _Alignment:
-    """A local optimum: the clock, the misfit of lengths and travel, and the standard deviation of the rate."""
-
-    clock: TrackerClock
-    misfit: float
-    rate_deviation: float
-
-
 def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> TrackerClock:
     """Time-delay estimation between geometric rope lengths ``|a_i - p|`` and the lengths that the winches wound.
 
@@ -88,7 +59,7 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     times, positions = tracker.time[rows], tracker.position[rows]
     lengths = GeometryReading().directions(robot, recorded_poses(tracker, rows))[0]
     _require_motion(log, tracker, positions)
-    fit = _ClockFit(robot, log, times, lengths)
+    fit = ClockFit(robot, log, times, lengths)
     alignments = [fit.refined(offset) for offset in _candidate_offsets(log, times, lengths)]
     fitting = sorted((each for each in alignments if each and each.misfit <= MAX_MISFIT), key=lambda each: each.misfit)
     if not fitting:
@@ -132,7 +103,7 @@ def _require_motion(log: Recording, tracker: Recording, positions: Array) -> Non
         raise RecordingError(still, "has no motion by which the tracker's clock could be found", hint)
 
 
-def _require_unique(path: str, best: _Alignment, others: list[_Alignment]) -> None:
+def _require_unique(path: str, best: Alignment, others: list[Alignment]) -> None:
     for other in others:
         is_apart = abs(other.clock.offset - best.clock.offset) > TRAVEL_WINDOW
         if is_apart and other.misfit <= EQUAL_RATIO * best.misfit + EQUAL_DIFFERENCE:
@@ -187,111 +158,3 @@ def _correlated_travel(log: Recording, times: Array, lengths: Array) -> _Correla
     is_shared = share >= MIN_MOTION_SHARE
     misfits = np.where(is_shared, 1.0 + 2.0 * product / np.where(is_shared, energy, 1.0), np.inf)
     return _CorrelatedTravel(misfits, interval * correlation_lags(len(shortened), len(reeled)), interval)
-
-
-class _ClockFit:
-    """Least squares for the clock of tracked rope lengths (M, n), in m, at ``times`` (M,) of the tracker.
-
-    Errors are lengths plus travel less elongations ``T L / (E A + T)`` by the measured tensions. Beside them each cable
-    has a constant, a drift and a scale of its winch.
-    """
-
-    def __init__(self, robot: Robot, log: Recording, times: Array, lengths: Array) -> None:
-        self.log, self.times, self.lengths, self.wound = log, times, lengths, log.wound_lengths()
-        self.compliances = np.array([1.0 / (cable.modulus * cable.area) for cable in robot.cables])
-        self.tensions = np.column_stack([_without_gaps(log.time, column) for column in log.tension.T])
-
-    def refined(self, offset: float) -> _Alignment | None:
-        """The optimum near an offset; None where it leads out of the log or does not converge."""
-        without_rate = self._converged(offset, is_rate_free=False)
-        with_rate = self._converged(offset, is_rate_free=True)
-        if with_rate and abs(with_rate.clock.rate - 1.0) > MIN_RATE_SIGMAS * with_rate.rate_deviation:
-            return with_rate
-        return without_rate
-
-    def _converged(self, offset: float, is_rate_free: bool) -> _Alignment | None:
-        clock = TrackerClock(offset)
-        for _ in range(MAX_ITERATIONS):
-            overlap = self._overlap(clock)
-            if len(overlap.times) < MIN_SAMPLES:
-                return None
-            step, deviations = self._step(overlap, is_rate_free)
-            log_rate = 1.0 / clock.rate + step[1]
-            if abs(log_rate - 1.0) > MAX_RATE_ERROR:
-                return None
-            middle = overlap.times.mean()
-            since_start = (middle - clock.offset) / clock.rate + step[0]
-            clock = TrackerClock(middle - since_start / log_rate, 1.0 / log_rate, deviations[0])
-            if abs(step[0]) + abs(step[1]) * np.ptp(overlap.times) < TOLERANCE:
-                return _Alignment(clock, self._misfit(clock), deviations[1])
-        return None
-
-    def _overlap(self, clock: TrackerClock) -> _Overlap:
-        log_times = clock.log_times(self.times, self.log.time[0])
-        rows = np.flatnonzero((log_times >= self.log.time[0]) & (log_times <= self.log.time[-1]))
-        rows = rows[:: 1 + len(rows) // MAX_SAMPLES]
-        lengths = self.lengths[rows]
-        travel, tensions, speeds = (
-            np.column_stack([np.interp(log_times[rows], self.log.time, column) for column in signals.T])
-            for signals in (self.wound, self.tensions, self.log.winch_speed)
-        )
-        strains = tensions * self.compliances
-        return _Overlap(
-            self.times[rows], lengths, travel, lengths + travel - lengths * strains / (1.0 + strains), speeds
-        )
-
-    def _step(self, overlap: _Overlap, is_rate_free: bool) -> tuple[Array, Array]:
-        """Gauss-Newton step of the log's time at the middle and of its rate, and their deviations by a jackknife."""
-        lever = overlap.times - overlap.times.mean()
-        levers = np.column_stack([np.ones_like(lever), lever][: 1 + is_rate_free])
-        errors = overlap.without_nuisances(overlap.errors)
-        squares = np.sum(errors**2, axis=1)
-        kept = overlap.rows(squares <= OUTLIER_RATIO * np.median(squares))
-        levers = levers[squares <= OUTLIER_RATIO * np.median(squares)]
-        errors = kept.without_nuisances(kept.errors)
-        jacobian = np.stack([kept.without_nuisances(kept.speeds * each[:, None]) for each in levers.T], axis=2)
-        inverse = np.linalg.pinv(np.einsum("kcp,kcq->pq", jacobian, jacobian), hermitian=True)
-        step = -inverse @ np.einsum("kcp,kc->p", jacobian, errors)
-        left = np.einsum("kcp,kc->kp", jacobian, errors + jacobian @ step)
-        scores = np.array([block.sum(axis=0) for block in np.array_split(left, JACKKNIFE_BLOCKS)])
-        covariance = inverse @ (scores.T @ scores) @ inverse * JACKKNIFE_BLOCKS / (JACKKNIFE_BLOCKS - 1)
-        return np.append(step, 0.0)[:2], np.append(np.sqrt(np.diag(covariance)), 0.0)[:2]
-
-    def _misfit(self, clock: TrackerClock) -> float:
-        """Rms of the errors over that of the lengths, both centred, without the twentieth of rows that err most."""
-        overlap = self._overlap(clock)
-        squares = np.sum((overlap.errors - np.median(overlap.errors, axis=0)) ** 2, axis=1)
-        inliers = squares <= np.quantile(squares, 0.95)
-        scale = float(np.sum((overlap.lengths[inliers] - overlap.lengths[inliers].mean(axis=0)) ** 2))
-        return float(np.sqrt(squares[inliers].sum() / scale)) if scale > 0.0 else np.inf
-
-
-@dataclass(frozen=True)
-class _Overlap:
-    """Samples (M,) of a tracker within the log: lengths, travel, errors (m) and winch speeds (m/s), each (M, n)."""
-
-    times: Array
-    lengths: Array
-    travel: Array
-    errors: Array
-    speeds: Array
-
-    def rows(self, selected: NDArray[np.bool_]) -> _Overlap:
-        """Some of the samples."""
-        signals = (self.times, self.lengths, self.travel, self.errors, self.speeds)
-        return _Overlap(*(signal[selected] for signal in signals))
-
-    def without_nuisances(self, signals: Array) -> Array:
-        """Signals (M, n) without what each cable's constant, drift and scale could explain."""
-        cleared = np.empty_like(signals)
-        for cable, signal in enumerate(signals.T):
-            basis = np.column_stack([np.ones_like(self.times), self.times - self.times[0], self.travel[:, cable]])
-            basis = np.linalg.qr(basis / np.maximum(np.abs(basis).max(axis=0), np.finfo(float).tiny))[0]
-            cleared[:, cable] = signal - basis @ (basis.T @ signal)
-        return cleared
-
-
-def _without_gaps(time: Array, signal: Array) -> Array:
-    """The signal interpolated where it is missing; 0 where it is missing everywhere."""
-    finite = np.isfinite(signal)
-    return np.interp(time, time[finite], signal[finite]) if finite.any() else np.zeros_like(signal)
