@@ -20,7 +20,6 @@ from tautwire.recordings.consistency import (
     require_matching_reeling,
     robot_size,
     travel_error,
-    travel_notes,
 )
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.start_position import start_position
@@ -176,17 +175,3 @@ def test_times_that_count_samples_are_told_with_the_interval() -> None:
     recording = of("three")
     (error,) = recording_mistakes(THREE, replace(recording, time=np.arange(recording.sample_count) + 0.0))
     assert "as the number of a sample does" in error.problem and "about 0.00999 by" in error.hint
-
-
-def test_travel_that_nothing_explains_is_noted_by_check(tmp_path: Path) -> None:
-    recording = of("three")
-    assert travel_notes(THREE, recording) == ()
-    speeds = recording.winch_speed.copy()
-    speeds[:, 1] *= 1.6
-    assert recording_mistakes(THREE, recording.with_winch_speed(speeds)) == ()
-    (note,) = travel_notes(THREE, recording.with_winch_speed(speeds))
-    assert "that of cable 2 most" in note
-    file = tmp_path / "log.csv"
-    recording.with_winch_speed(speeds).frame().to_csv(file, index=False)
-    check = check_files(EXAMPLES / "three" / "robot.toml", file)
-    assert any("that of cable 2 most" in note for note in check.notes)

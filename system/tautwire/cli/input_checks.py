@@ -13,10 +13,10 @@ from ..errors import InputError, RecordingError, RobotFileError, UnknownColumnsE
 from ..estimation.preprocessing import prepare_recordings
 from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.column_map import unit_errors
-from ..recordings.consistency import travel_notes
 from ..recordings.mdf_file import is_mdf
 from ..recordings.mistaken_orientation import orientation_notes
 from ..recordings.recording import Recording, read_recording, recording_errors
+from ..recordings.recording_notes import recording_notes
 from ..recordings.start_position import start_pose
 from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
@@ -249,7 +249,7 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
         prepared_notes = prepare_recordings(robot.as_modelled(), recording, None).notes
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
         notes.extend(start_pose(robot, noise, recording)[1])
-        notes.extend(travel_notes(robot.as_modelled(), recording))
+        notes.extend(recording_notes(robot.as_modelled(), recording))
         notes.extend(_without_uncertainties(robot))
         notes.extend(prepared_notes)
 

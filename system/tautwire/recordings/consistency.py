@@ -29,8 +29,6 @@ MAX_TRAVEL_TO_SIZE = 3.0
 MAX_WINCH_SPEED, SPEED_QUANTILE = 60.0, 0.99
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
-# Of lifelike recordings the ropes' motion and the winch travel differ by less.
-MAX_USUAL_MISFIT = 0.15
 CHECKED_DURATION = 60.0  # s
 MAX_SAMPLE_INTERVAL = 0.5  # s
 # Rms of what lengths in the columns of speeds miss, over that of the geometric ones.
@@ -120,21 +118,6 @@ def _excessive_travel(robot: Robot, recording: Recording) -> RecordingError | No
             "[recording.columns]"
         )
     return RecordingError(recording.path, problem, hint)
-
-
-def travel_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
-    """A note where winch travel and poses differ by more than effects usually make them, for whatever cause."""
-    if {setting.name for setting in robot.effects} & EFFECTS_ON_POSES:
-        return ()
-    motion, regression = check_motion(robot, recording), length_regression(robot, recording)
-    if motion is None or regression is None or motion.misfit <= MAX_USUAL_MISFIT:
-        return ()
-    cable = int(np.argmax(regression.misfits)) + 1
-    return (
-        f"{recording.path}: winch travel is off the recorded positions by {_percentage(motion.misfit)} of the ropes' "
-        f"motion, that of cable {cable} most, and no unit, sign, order or frame that was tried explains it; ropes and "
-        f"drums usually leave less than {_percentage(MAX_USUAL_MISFIT)}: compare exit points and encoders",
-    )
 
 
 def row_number_error(robot: Robot, recording: Recording) -> RecordingError | None:

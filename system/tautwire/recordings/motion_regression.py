@@ -144,14 +144,9 @@ def _moves(signals: Array, rows: NDArray[np.int64]) -> bool:
 
 
 def quasi_static_units(robot: Robot, recording: Recording, rows: NDArray[np.int64]) -> dict[str, tuple[str, ...]]:
-    """Units of anchors, by that of time, with which the winches move too slowly to excite the lowest mode.
-
-    The frequency of the winches, in their stretch of rows, is the rms of their speed over that of their travel.
-    """
-    stretch = slice(rows[0], rows[-1] + 1)
-    travel = centred(recording.wound_lengths()[stretch])
-    frequency = np.sqrt(np.sum(recording.winch_speed[stretch] ** 2) / max(float(np.sum(travel**2)), 1e-300))
-    natural = {unit: _lowest_frequency(robot, unit) for unit in ANCHOR_UNITS}
+    """Units of anchors, by that of time, with which the winches move too slowly to excite the lowest mode."""
+    frequency = _winch_frequency(recording, rows)
+    natural = {unit: lowest_frequency(robot, unit) for unit in ANCHOR_UNITS}
     by_time = {
         time_unit: tuple(unit for unit in natural if frequency / size <= MAX_QUASI_STATIC_SHARE * natural[unit])
         for time_unit, size in TIME_UNITS.items()
@@ -159,7 +154,24 @@ def quasi_static_units(robot: Robot, recording: Recording, rows: NDArray[np.int6
     return {time_unit: units for time_unit, units in by_time.items() if units}
 
 
-def _lowest_frequency(robot: Robot, anchor_unit: str) -> float:
+def dynamic_amplification(robot: Robot, recording: Recording, rows: NDArray[np.int64]) -> float:
+    """Share ``r^2 / (1 - r^2)`` by which a platform overshoots; r is the frequency of the winches to the lowest mode's.
+
+    Infinite where the motion is not quasi-static.
+    """
+    natural = lowest_frequency(robot, "m")
+    ratio = _winch_frequency(recording, rows) / natural if natural > 0.0 else np.inf
+    return float(ratio**2 / (1.0 - ratio**2)) if ratio <= MAX_QUASI_STATIC_SHARE else np.inf
+
+
+def _winch_frequency(recording: Recording, rows: NDArray[np.int64]) -> float:
+    """Angular frequency of the winches in their stretch of rows, rad/s: rms of speed over that of travel."""
+    stretch = slice(rows[0], rows[-1] + 1)
+    travel = centred(recording.wound_lengths()[stretch])
+    return float(np.sqrt(np.sum(recording.winch_speed[stretch] ** 2) / max(float(np.sum(travel**2)), 1e-300)))
+
+
+def lowest_frequency(robot: Robot, anchor_unit: str) -> float:
     """Lowest angular frequency that winches excite, rad/s; of a rigid platform with attachments in any unit."""
     if not robot.platform.is_rigid_body:
         return _lowest_natural_frequency(robot, GeometryReading(anchor_unit=anchor_unit))

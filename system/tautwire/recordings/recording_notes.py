@@ -1,0 +1,90 @@
+"""What kinematics and statics of a recording say that no mistake in its columns explains, as notes of a check."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..robot.schema import Robot
+from .consistency import EFFECTS_ON_FORCES, EFFECTS_ON_POSES
+from .load_cell_scale import LoadCellScale, load_cell_scale
+from .mistaken_motion import check_motion
+from .motion_regression import length_regression
+from .position_lag import PositionLag, position_lag
+from .recording import Recording
+from .winch_scales import WinchScale, winch_scales
+
+# Of lifelike recordings the ropes' motion and the winch travel differ by less.
+MAX_USUAL_MISFIT = 0.15
+
+
+def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
+    """Notes on a lag of the positions, the scale of each winch and that of all load cells, which effects explain.
+
+    Where neither lag nor scales are told, one on winch travel and poses that differ by more than effects usually make
+    them, for whatever cause. Robots that declare effects of the kind are not judged.
+    """
+    declared = {setting.name for setting in robot.effects}
+    notes: list[str] = []
+    if not declared & EFFECTS_ON_POSES:
+        lag = position_lag(robot, recording)
+        scales = () if "drum" in declared else winch_scales(robot, recording, lag.seconds if lag else 0.0)
+        notes += [_lag_text(lag)] if lag else []
+        notes += [_scales_text(scales)] if scales else []
+        if not notes:
+            notes += _unexplained_travel(robot, recording)
+    if not (robot.formulas or declared & EFFECTS_ON_FORCES):
+        scale = load_cell_scale(robot, recording)
+        notes += [_load_cell_text(scale)] if scale else []
+    return tuple(f"{recording.path}: {note}" for note in notes)
+
+
+def _lag_text(lag: PositionLag) -> str:
+    direction, traced = "ahead of", "trace corrects the clock"
+    if lag.seconds > 0.0:
+        direction, traced = (
+            "behind",
+            "trace tells it as sensor_delay, or corrects the clock where it is in one recording",
+        )
+    return (
+        f"positions are {abs(lag.seconds):.3f} s (+- {2.0 * lag.deviation:.1g}) {direction} the winches: without that, "
+        f"rope lengths miss winch travel by {1e3 * lag.rms_after:.2g} mm, not {1e3 * lag.rms_before:.2g} mm; {traced}"
+    )
+
+
+def _scales_text(scales: tuple[WinchScale, ...]) -> str:
+    cables = [scale.cable for scale in scales]
+    factors = ", ".join(f"{scale.factor:.3f}" for scale in scales)
+    deviation = 2.0 * max(scale.deviation for scale in scales)
+    if len(cables) == 1:
+        winches, drums = f"winch {cables[0]}", "a drum"
+    else:
+        winches, drums = f"winches {', '.join(map(str, cables[:-1]))} and {cables[-1]}", "drums"
+    return (
+        f"rope moves {factors} (+- {max(deviation, 1e-3):.1g}) of what {winches} wound: {drums} of another radius than "
+        "declared, or another factor of counts; trace tells it as drum"
+    )
+
+
+def _load_cell_text(scale: LoadCellScale) -> str:
+    causes = [] if scale.gain is None else [f"a gain of all load cells of {scale.gain:.3g} (sensor_gain)"]
+    if scale.offset is not None:
+        causes.append(f"an offset of all load cells of {scale.offset:.3g} N (sensor_offset)")
+    if scale.payload is not None:
+        causes.append(f"a payload of {scale.payload:.3g} kg (payload)")
+    apart = ", which statics alone cannot tell apart" if len(causes) > 1 else ""
+    return (
+        f"tensions carry {100.0 * scale.carried:.1f} % (+- {200.0 * scale.deviation:.1g}) of the platform's "
+        f"weight: {' or '.join(causes)}{apart}, unless pulleys or sag that the robot file lacks turn the ropes"
+    )
+
+
+def _unexplained_travel(robot: Robot, recording: Recording) -> list[str]:
+    motion, regression = check_motion(robot, recording), length_regression(robot, recording)
+    if motion is None or regression is None or motion.misfit <= MAX_USUAL_MISFIT:
+        return []
+    cable = int(np.argmax(regression.misfits)) + 1
+    return [
+        f"winch travel is off the recorded positions by {100.0 * motion.misfit:.0f} % of the ropes' motion, that of "
+        f"cable {cable} most, and no unit, sign, order or frame that was tried explains it; ropes and drums usually "
+        f"leave less than {100.0 * MAX_USUAL_MISFIT:.0f} %: compare exit points and encoders"
+    ]
