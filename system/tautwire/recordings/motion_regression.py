@@ -131,7 +131,12 @@ def moving_rows(robot: Robot, recording: Recording) -> NDArray[np.int64] | None:
 
 
 def moves_along_two_axes(lengths: Array) -> bool:
-    """Whether centred lengths (M, n) vary along more than one direction: along another, ropes give otherwise."""
+    """Whether centred lengths (M, n) vary along more than one direction: along another, ropes give otherwise.
+
+    False where poses inside a pulley have no lengths.
+    """
+    if not np.isfinite(lengths).all():
+        return False
     first, second = np.linalg.svd(lengths, compute_uv=False)[:2]
     return bool(second >= MIN_SECOND_MOTION * first)
 

@@ -38,13 +38,16 @@ class PositionLag:
 def position_lag(robot: Robot, recording: Recording) -> PositionLag | None:
     """The lag where it is significant and explains most of what rope lengths and winch travel differ by; else None.
 
-    Time-delay estimation as of a tracker's clock, which each winch's scale and drift do not affect. None too where the
-    platform is driven so fast that it swings, and where the lag is one that damping makes.
+    Time-delay estimation as of a tracker's clock, which each winch's scale and drift do not affect. None too of a
+    motion that makes the platform swing, of a lag that damping makes, and where a pose lies in a pulley.
     """
     rows = moving_rows(robot, recording)
     if rows is None or "m" not in quasi_static_units(robot, recording, rows).get("s", ()):
         return None
     lengths = GeometryReading().directions(robot, recorded_poses(recording, rows))[0]
+    natural = lowest_frequency(robot, "m")
+    if not (natural > 0.0 and np.isfinite(lengths).all()):
+        return None
     fit, start = ClockFit(robot, recording, recording.time[rows], lengths), float(recording.time[0])
     alignment = fit.converged(start, is_rate_free=False)
     if alignment is None:
@@ -53,7 +56,7 @@ def position_lag(robot: Robot, recording: Recording) -> PositionLag | None:
     least = (
         MIN_SIGMAS * deviation,
         MIN_INTERVALS * _position_interval(recording),
-        MIN_PERIOD_SHARE / lowest_frequency(robot, "m"),
+        MIN_PERIOD_SHARE / natural,
     )
     rms_before, rms_after = (_rms(fit, clock) for clock in (TrackerClock(start), alignment.clock))
     if abs(seconds) <= max(least) or rms_after > MAX_RESIDUAL_SHARE * rms_before:

@@ -80,7 +80,7 @@ def _load_cell_text(scale: LoadCellScale) -> str:
 
 def _unexplained_travel(robot: Robot, recording: Recording) -> list[str]:
     motion, regression = check_motion(robot, recording), length_regression(robot, recording)
-    if motion is None or regression is None or motion.misfit <= MAX_USUAL_MISFIT:
+    if motion is None or regression is None or not MAX_USUAL_MISFIT < motion.misfit < np.inf:
         return []
     cable = int(np.argmax(regression.misfits)) + 1
     return [

@@ -39,13 +39,15 @@ def winch_scales(robot: Robot, recording: Recording, lag: float = 0.0) -> tuple[
     """The cables whose scale differs from 1 by more than survey, stretch and pulleys make it, and explains the misfit.
 
     Least squares of each geometric length, less its elongation by the measured tension, on constant, drift and what was
-    wound; positions are ``lag`` s late. None of a motion that is not quasi-static.
+    wound; positions are ``lag`` s late. None of a motion that is not quasi-static, or leads into a pulley.
     """
     rows = moving_rows(robot, recording)
     amplification = np.inf if rows is None else dynamic_amplification(robot, recording, rows)
     if rows is None or not np.isfinite(amplification):
         return ()
     lengths, directions = GeometryReading().directions(robot, recorded_poses(recording, rows))
+    if not np.isfinite(lengths).all():
+        return ()
     fit = ClockFit(robot, recording, recording.time[rows], lengths)
     overlap = fit.overlap(TrackerClock(float(recording.time[0]) + lag))
     directions = directions[np.isin(recording.time[rows], overlap.times)]
