@@ -117,6 +117,7 @@ def test_outputs_are_true_whatever_sensors_show(controller: str, variant: int, t
     shared = build_context(read_plan(plan), {})
     row = run_job(shared, Job(0, 0, variant, VALUES), tmp_path / "kept").row
     assert "failure" not in row
+    assert variant or (shared.bundle and (tmp_path / "kept" / shared.bundle.structure).is_dir())
     # The path is a millimetre long, and moves as slowly as tensions of statics allow.
     assert np.allclose([row[f"end_{axis}"] for axis in "xyz"], (28.86, 0.0, 5.0), atol=0.1)
     assert row["slack"] is False

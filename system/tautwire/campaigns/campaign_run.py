@@ -171,11 +171,11 @@ def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignCo
     if not plan.paths:
         return CampaignContext(plan, recordings)
     robot = robot_from_content(dict(plan.content), plan.file)
-    bundle = build_bundle(at_path_start(robot, plan.paths[0]))
     reference_inputs = {
         variant: build_reference_input(robot, plan.paths[path], controller, plan.compute, recordings)
         for variant, (path, controller) in enumerate(plan.variants)
     }
+    bundle = build_bundle(_simulated_robot(at_path_start(robot, plan.paths[0]), reference_inputs[0]))
     differs_by_run = plan.belief == "varied" or any(key.startswith("platform.start") for key in plan.keys)
     return CampaignContext(plan, recordings, bundle, {} if differs_by_run else reference_inputs)
 
@@ -261,11 +261,16 @@ def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
 def _true_motion(
     robot: Robot, bundle: FmuBundle, fmu_folder: Path, reference_input: ReferenceInput, plan: Plan, job: Job
 ) -> CosimulationResult:
-    """The motion of a run, not as its sensors show it: these matter to it only where a controller feeds them back."""
-    design = reference_input.design
-    simulated = robot if design is not None and design.uses_feedback else without_sensor_effects(robot)
+    """The motion of a run, not as its sensors show it."""
+    simulated = _simulated_robot(robot, reference_input)
     fmus = cached_fmus(simulated, bundle, fmu_folder)
     return without_gains_and_offsets(simulated, fmus, _simulate(fmus, reference_input, plan, job))
+
+
+def _simulated_robot(robot: Robot, reference_input: ReferenceInput) -> Robot:
+    """The robot without sensor effects, unless a controller feeds back what they show."""
+    design = reference_input.design
+    return robot if design is not None and design.uses_feedback else without_sensor_effects(robot)
 
 
 def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job: Job) -> CosimulationResult:

@@ -104,7 +104,8 @@ def read_path_file(path: str | Path, robot: Robot) -> PathPlan:
 def read_plan(path: str | Path) -> Plan:
     """Read a plan file; files that it names are relative to it.
 
-    Raises PlanError, RobotFileError or RecordingError where it, or a file that it names, is invalid.
+    Raises PlanError, RobotFileError or RecordingError where it, or a file that it names, is invalid, UnreachableError
+    where the cables cannot hold the platform where a recorded path starts.
     """
     table = _load_plan(Path(path))
     table.require_known(PLAN_KEYS)
