@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from tautwire.errors import InputError
+from tautwire.errors import ArgumentError, InputError
 from tautwire.materials import (
     PAPER_PAIR_FREQUENCY,
     PAPER_TABLE,
@@ -249,6 +249,11 @@ def test_a_robot_takes_the_rope() -> None:
     assert {name: setting.values[name] for name in rope.relaxation} == rope.relaxation
     assert setting.values["modulus_3"] == 0.0
     assert declared_material(robot, "robot.toml") == Material(100e9, rope.damping, rope.branches)
+
+
+def test_more_branches_than_a_robot_file_holds_are_refused() -> None:
+    with pytest.raises(ArgumentError, match="has 4 branches, a robot file holds 3"):
+        robot_material(Material(100e9, 0.3e9, tuple(MaxwellBranch(5e9, time) for time in (0.1, 0.3, 1.0, 3.0))))
 
 
 def test_what_acts_in_a_robots_ropes_is_declared() -> None:

@@ -197,7 +197,10 @@ def _structure_of(declared: Material) -> ModelStructure:
 def _identified_effects(
     selection: ModelSelection, chosen: EvaluatedModel, declared: Material | None, significance_level: float
 ) -> tuple[IdentifiedEffect, ...]:
-    """Terms that the declared rope lacks or has wrong, by falling likelihood ratio."""
+    """Terms that a constant pair lacks, and constants that the declared rope has wrong, by falling likelihood ratio.
+
+    Where the declared rope does not fit, its relaxation is identified anew with the rest.
+    """
     effects = [
         IdentifiedEffect(effect, _parameters_of(chosen, effect), selection.evidence(effect))
         for effect in selection.chosen.effects - CONSTANT_PAIR.effects

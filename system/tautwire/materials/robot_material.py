@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..errors import InputError
+from ..errors import ArgumentError, InputError
 from ..robot.schema import EffectSetting, Robot
 from .material_verdict import Estimate
 from .modulus_intervals import CONFIDENCE_LEVEL
@@ -67,6 +67,8 @@ def robot_material(material: Material, estimates: Iterable[Estimate] = ()) -> Ro
 
     A branch faster than the effect allows acts as a damper of ``E_k tau_k``, and becomes one, uncertain by all of it.
     The other uncertainties are those of the ``estimates`` of modulus and damping.
+
+    Raises ArgumentError where there are more branches than the effect has.
     """
     min_relaxation_time = next(each.minimum for each in BY_NAME["relaxation"].parameters if each.name == "time")
     resolved_branches = tuple(branch for branch in material.branches if branch.relaxation_time >= min_relaxation_time)
@@ -75,6 +77,9 @@ def robot_material(material: Material, estimates: Iterable[Estimate] = ()) -> Ro
         for branch in material.branches
         if branch.relaxation_time < min_relaxation_time
     )
+    if len(resolved_branches) > MAX_BRANCHES:
+        problem = f"has {len(resolved_branches)} branches, a robot file holds {MAX_BRANCHES}"
+        raise ArgumentError("robot_material: material", material, problem, "fit fewer branches")
     deviations = {each.effect: _standard_deviation(each) for each in estimates}
     return RobotMaterial(
         material.modulus,
@@ -117,7 +122,7 @@ def declared_material(robot: Robot, where: str) -> Material:
     """The one rope of a robot's cables, as declared and as its effects set it; raises InputError where they differ."""
     ropes = {_acting_material(robot, cable) for cable in robot.cable_numbers}
     if len(ropes) > 1:
-        problem = f"its cables have {len(ropes)} different ropes, by modulus, damping and [[effect]] tables of these"
+        problem = f"its cables have {len(ropes)} different ropes, by modulus, damping and effects that set these"
         raise InputError(where, problem, "give a robot whose cables are all of the tested rope")
     return ropes.pop()
 
