@@ -51,10 +51,10 @@ def main() -> None:
     if asked.list:
         print("\n".join(case.key for case in cases))
         return
-    kept = keep(ANSWERS, read_lines(asked.folder / "results.jsonl"))
+    kept = kept_with_results(asked.folder)
     if not asked.show:
         run(cases, asked.folder, code_version(), asked.jobs, tell, kept)
-        kept = keep(ANSWERS, read_lines(asked.folder / "results.jsonl"))
+        kept = kept_with_results(asked.folder)
     show(scored(cases, finished(cases, kept)))
     write(kept)
 
@@ -66,6 +66,13 @@ def cases_of(asked: argparse.Namespace) -> Sequence[Case]:
     if asked.platforms:
         return platform_cases()
     return lifelike_cases() if asked.lifelike else quick_cases() if asked.quick else main_cases()
+
+
+def kept_with_results(folder: Path) -> tuple[Line, ...]:
+    """The kept lines with those of the folder, but for such as another version of the tracer left there long ago."""
+    answered = {line.key for line in read_lines(ANSWERS)}
+    results = read_lines(folder / "results.jsonl")
+    return keep(ANSWERS, [line for line in results if line.code == code_version() or line.key not in answered])
 
 
 def tell(case: Case, line: Line) -> None:
