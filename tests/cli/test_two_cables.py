@@ -76,7 +76,10 @@ def test_workspace_is_the_static_one(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 @pytest.mark.parametrize(
     ("start", "cables", "words"),
-    [("[1.4, 0.2, 0.9]", 2, "the 2 cables lie in one plane there"), ("[0.0, 0.0, 0.9]", 1, "1 given, a robot has two")],
+    [
+        ("[1.4, 0.2, 0.9]", 2, "exit points alone, and it is 0.2 m beside it"),
+        ("[0.0, 0.0, 0.9]", 1, "1 given, a robot has two"),
+    ],
 )
 def test_what_two_cables_cannot_hold_and_one_cable_are_refused(
     start: str, cables: int, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -35,7 +35,6 @@ MAX_COUNTED_ERRORS = 100_000
 # Finding the line of each problem takes time, so line numbers are left out where the file is long.
 MAX_ROBOT_FILE_PROBLEMS = 50
 MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
-
 # Keys that do not affect whether the cables hold the platform at the start.
 KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",), ("recording",)))
 

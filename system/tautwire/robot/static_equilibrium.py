@@ -111,8 +111,21 @@ def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Ar
         return tensions
     excess = least_limit_violations(direction_matrix, load, limits)
     if not np.all(np.isfinite(excess)):
-        raise unreachable_error(robot, position, f"the {len(excess)} cables lie in one plane there")
+        raise unreachable_error(robot, position, _reason_out_of_plane(robot, position))
     worst = int(np.argmax(np.abs(excess)))
     bound = limits.minimum if excess[worst] < 0.0 else limits.maximum
     reason = f"no tensions between {limits.minimum:g} and {limits.maximum:g} N hold the platform there"
     raise unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
+
+
+def _reason_out_of_plane(robot: Robot, position: Array) -> str:
+    """Why cables in one plane do not hold the load: of two, how far they hang out of the vertical plane."""
+    if robot.cable_count > 2:
+        return f"the {robot.cable_count} cables lie in one plane there"
+    first, second = (np.array(anchor, dtype=float) for anchor in robot.anchors)
+    across = np.cross(second - first, (0.0, 0.0, 1.0))
+    width = float(np.linalg.norm(across))
+    distance = abs(float(across @ (position - first))) / width if width > 0.0 else 0.0
+    return (
+        f"two cables hold a load in the vertical plane of their exit points alone, and it is {distance:.3g} m beside it"
+    )
