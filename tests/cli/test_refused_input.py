@@ -88,12 +88,13 @@ def test_a_missing_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "winch_speed_3" in capsys.readouterr().err
 
 
-def test_two_cables_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_cables_that_cannot_hold_the_platform_build_no_fmus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = Path(ROBOT).read_text(encoding="utf-8")
-    place = tmp_path / "two.toml"
-    place.write_text(text[: text.rindex("[[cable]]")], encoding="utf-8")
-    assert run(["build", str(place), "--out", str(tmp_path / "out")]) == 2
-    assert "three" in capsys.readouterr().err
+    robot_file = tmp_path / "two.toml"
+    robot_file.write_text(text[: text.rindex("[[cable]]")], encoding="utf-8")
+    assert run(["build", str(robot_file), "--out", str(tmp_path / "out")]) == 2
+    assert "it is 28.9 m beside it" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
