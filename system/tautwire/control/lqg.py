@@ -113,9 +113,9 @@ def design_controller(
     """Designs LQG with integral action on the plant linearised at ``at``, three coordinates in m, by default the start.
 
     ``a_k = -K (x_k, w_k, z_k)``: winch accelerations (n,) in m/s^2 from the estimate of a Kalman filter, winch speeds
-    and summed errors of the pose, sampled at ``aim.period``. ``aim`` holds weights and limits. ``notes`` of the design
-    tell where its disk margin is below 0.1. The ``orientation`` of a
-    rigid platform is a unit quaternion, by default that of the robot file.
+    and summed errors of the pose, sampled at ``aim.period``. ``aim`` holds weights and limits. The ``orientation`` of a
+    rigid platform is a unit quaternion, by default that of the robot file. ``notes`` of the design tell where its disk
+    margin is below 0.1.
 
     Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold
     it stably, InputError where winches do not reach a mode that does not decay, or sensors do not show it,
