@@ -51,6 +51,9 @@ def test_headline_tells_the_values_of_the_largest_effect_with_their_intervals() 
     damping = replace(trace.effects[0], share=0.05)
     told = "Fitted drum (cable 2): radius_ratio 0.9400 (95 % interval 0.9370 to 0.9430)."
     assert told in " ".join(rendered(replace(trace, effects=(damping, drum))).split())
+    opened = replace(drum, parameters={"radius_ratio": replace(ratio, low=-math.inf)})
+    told = "radius_ratio 0.9400 (95 % interval up to 0.9430)."
+    assert told in " ".join(rendered(replace(trace, effects=(opened,))).split())
     assert "Fitted" not in rendered(nothing_found(trace)) + rendered(replace(trace, verdict="unexplained"))
 
 

@@ -35,7 +35,7 @@ from .trace_texts import (
     headline,
     noise_sentence,
     output_groups,
-    runner_up_text,
+    runners_up,
     separating_commands,
     undetectable_effects,
     values_text,
@@ -84,6 +84,7 @@ def trace_page(trace: Trace, links: Mapping[str, str], provenance: Provenance | 
         has_declared=any(each.declared is not None for effect in trace.effects for each in effect.parameters.values()),
         has_check=comparison_by_role(trace, "check") is not None,
         correlations=_correlation_sentences(trace),
+        runners_up=runners_up(trace),
         alternatives=alternative_texts(trace),
         commands=separating_commands(trace),
         would_show=detectable_texts(trace) if trace.verdict == "none" else [],
@@ -145,15 +146,15 @@ def _shared_scale(trace: Trace, output: MeasuredOutput) -> tuple[float, float]:
 
 def _effect_rows(trace: Trace, effect: FoundEffect) -> list[Row]:
     location = cables_text(effect.cables, trace.robot_before.cable_count) if effect.cables else effect.component
-    evidence, runner_up = Number(format_evidence(effect.evidence)), runner_up_text(trace, effect) or ABSENT_TEXT
+    evidence = Number(format_evidence(effect.evidence))
     rows: list[Row] = []
     for name, estimate in effect.parameters.items():
         text = format_estimate(estimate)
         chart = charts.whisker(estimate.value, estimate.low, estimate.high, estimate.declared)
         value, interval = Number(text.value, strong=True), Number(f"{text.low} to {text.high}")
         # Named once: each name is one effect, however many parameters it has.
-        names, once = (("", ""), ("", "")) if rows else ((effect.name, location), (evidence, runner_up))
-        rows.append([*names, name, value, interval, Number(text.declared), text.unit, chart, *once])
+        names, evidence_once = (("", ""), "") if rows else ((effect.name, location), evidence)
+        rows.append([*names, name, value, interval, Number(text.declared), text.unit, chart, evidence_once])
     return rows
 
 

@@ -29,7 +29,7 @@ from .trace_texts import (
     headline,
     noise_sentence,
     output_groups,
-    runner_up_text,
+    runners_up,
     separating_commands,
     undetectable_effects,
     values_text,
@@ -53,8 +53,7 @@ def trace_table(trace: Trace) -> RenderableType:
     ]
     if trace.effects:
         blocks.append(_effect_table(trace))
-        rivals = [f"{each.name}: {text}" for each in trace.effects if (text := runner_up_text(trace, each))]
-        if rivals:
+        if rivals := runners_up(trace):
             blocks.append(_paragraph("Next best in the round of each, by its evidence there", rivals))
     if trace.formula:
         blocks.append(_paragraph("Formula", [trace.formula]))

@@ -151,10 +151,17 @@ def headline(trace: Trace) -> str:
     values = []
     for name, estimate in largest.parameters.items():
         text = format_estimate(estimate)
-        values.append(f"{name} {text.value} {text.unit}".rstrip() + f" (95 % interval {text.low} to {text.high})")
+        values.append(f"{name} {text.value} {text.unit}".rstrip() + f" (95 % interval {_interval_text(text)})")
     hidden_count = len(values) - MAX_VALUES_IN_HEADLINE
     more = f" and {hidden_count} more" if hidden_count > 0 else ""
     return f"{trace.sentence} Fitted {largest.name}{cables}: {', '.join(values[:MAX_VALUES_IN_HEADLINE])}{more}."
+
+
+def _interval_text(text: EstimateText) -> str:
+    """An interval in words; of an open end it names the other."""
+    if text.low == ABSENT_TEXT:
+        return "unbounded" if text.high == ABSENT_TEXT else f"up to {text.high}"
+    return f"from {text.low}" if text.high == ABSENT_TEXT else f"{text.low} to {text.high}"
 
 
 def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
@@ -168,31 +175,27 @@ def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list
     return [(number, list(group)) for number, group in groupby(ordered, key=lambda each: each.round)]
 
 
-def runner_up_text(trace: Trace, effect: FoundEffect) -> str:
-    """The best other effect of the round that took an effect, as in "modulus, all cables: 64.2 of 812.4".
+def runners_up(trace: Trace) -> list[str]:
+    """The best other effect of the round that took each effect: "damping: modulus, all cables: 64.2 of 812.4".
 
-    Both numbers are evidence of that round, in nats. Blank where the round is not known, or has no fitted rival.
+    Both numbers are evidence of that round, in nats. Without effects whose round is not known, or has no fitted rival.
     """
-    taken = next(
-        (
-            each
-            for each in trace.candidates
-            if each.accepted and each.name == effect.name and set(effect.cables) <= set(each.cables)
-        ),
-        None,
-    )
-    if taken is None:
-        return ""
-    rivals = [
-        each
-        for each in trace.candidates
-        if each.round == taken.round and each.name != effect.name and math.isfinite(each.evidence)
-    ]
-    if not rivals:
-        return ""
-    best = max(rivals, key=lambda each: each.evidence)
-    cables = f", {cables_text(best.cables, trace.robot_before.cable_count)}" if best.cables else ""
-    return f"{best.name}{cables}: {format_evidence(best.evidence)} of {format_evidence(taken.evidence)}"
+    lines = []
+    for effect in trace.effects:
+        taken = next((each for each in trace.candidates if _is_taken_as(each, effect)), None)
+        fitted = [each for each in trace.candidates if taken and each.round == taken.round and each.name != effect.name]
+        best = max(
+            (each for each in fitted if math.isfinite(each.evidence)), key=lambda each: each.evidence, default=None
+        )
+        if taken and best:
+            cables = f", {cables_text(best.cables, trace.robot_before.cable_count)}" if best.cables else ""
+            evidence = f"{format_evidence(best.evidence)} of {format_evidence(taken.evidence)}"
+            lines.append(f"{effect.name}: {best.name}{cables}: {evidence}")
+    return lines
+
+
+def _is_taken_as(candidate: Candidate, effect: FoundEffect) -> bool:
+    return candidate.accepted and candidate.name == effect.name and set(effect.cables) <= set(candidate.cables)
 
 
 def candidate_status(candidate: Candidate, of_round: Sequence[Candidate]) -> str:
