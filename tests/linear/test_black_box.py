@@ -20,10 +20,12 @@ from tautwire.linear import (
     BlackBoxPlant,
     IdentificationError,
     PlantSignals,
+    black_box,
     linearise,
     linearise_fmus,
     linearise_robot_fmus,
 )
+from tautwire.linear.pulse_experiments import PulseExperiment
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu, Winch
 from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.effects import with_effects
@@ -106,6 +108,28 @@ def test_fmus_that_take_steps_of_one_length_only_get_no_others(tmp_path: Path, m
     assert len(set.union(*steps.values())) > 1
     assert max(map(len, steps.values())) == 1
     assert max(distances(plant, linearise(example("three")).system).values()) < AGREES
+
+
+def test_pulses_are_of_the_nominal_value_that_a_declared_type_states(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class PreparedError(Exception):
+        pass
+
+    def prepare(*arguments: Any) -> None:
+        with ExitStack() as stack:
+            raise PreparedError(PulseExperiment(stack, *arguments).nominal.tolist())
+
+    monkeypatch.setattr(black_box, "pulse_experiment", prepare)
+    types = '<TypeDefinitions><SimpleType name="Speed"><Real unit="m/s" nominal="0.25"/></SimpleType></TypeDefinitions>'
+    changes = {
+        '<Real start="0.0" unit="m/s"/>': '<Real declaredType="Speed" start="0.0"/>',
+        "<LogCategories>": f"{types}<LogCategories>",
+    }
+    (changed := tmp_path / "changed").mkdir()
+    with pytest.raises(PreparedError) as prepared:
+        linearise_robot_fmus(with_descriptions(build_fmus(example("three"), tmp_path), changed, changes))
+    assert prepared.value.args[0][:3] == [0.25] * 3
 
 
 def smooth(case: Case) -> bool:
