@@ -133,11 +133,13 @@ def few_valued(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.validate
-def test_an_effect_is_named_beside_rope_lengths() -> None:
-    found = trace(
-        THREE, counted(1, 1e-6, {"drum": {"radius_ratio": 1.01}}), counted(2, 1e-6, {"drum": {"radius_ratio": 1.01}})
-    )
+def test_an_effect_is_named_beside_rope_lengths_and_its_kinematic_scales_are_told() -> None:
+    drums = {"drum": {"radius_ratio": 1.15}}
+    found = trace(THREE, counted(1, 1e-6, drums), counted(2, 1e-6, drums))
     (drum,) = found.effects
     assert found.verdict == "effects" and drum.name == "drum"
-    assert drum.parameters["radius_ratio"].value == pytest.approx(1.01, abs=1e-5)
+    assert drum.parameters["radius_ratio"].value == pytest.approx(1.15, abs=1e-5)
     assert found.noise_after and any("splines" in note for note in found.notes)
+    scales = [note for note in found.notes if "by kinematics alone" in note]
+    factors = [float(note.split("rope moves ")[1].split(",")[0]) for note in scales]
+    assert factors == pytest.approx([1.15, 1.15], abs=2e-3)

@@ -13,7 +13,7 @@ import pytest
 from tautwire.cli.input_checks import check_files
 from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.recording import Recording, read_recording
-from tautwire.recordings.recording_notes import recording_notes
+from tautwire.recordings.recording_notes import kinematic_scale_notes, recording_notes
 from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.folders import SHARED_RECORDINGS
 from tests.support.pose_recordings import noisy, wandering_recording
@@ -66,6 +66,11 @@ def test_a_drum_of_another_radius_on_all_winches_is_told_with_each_factor() -> N
     (note,) = notes("caroca", {"drum": {"radius_ratio": 0.94}})
     assert numbers(note)[:4] == pytest.approx([0.94, 0.94, 0.94, 0.001], abs=2e-3)
     assert "of what winches 1, 2 and 3 wound: drums of another radius" in note and "trace tells it as drum" in note
+    robot, recording = example("caroca").as_modelled(), recorded("caroca", 3, {"drum": {"radius_ratio": 0.94}})
+    (kinematic,) = kinematic_scale_notes(robot, recording)
+    assert kinematic.endswith(note.split(": ")[1]) and "by kinematics alone" in kinematic
+    drum = EffectSetting("drum", {"radius_ratio": 0.94}, robot.cable_numbers)
+    assert kinematic_scale_notes(replace(robot, effects=(drum,)), recording) == ()
 
 
 @pytest.mark.parametrize("name", ["three", "caroca"])

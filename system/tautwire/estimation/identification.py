@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import ArgumentError, NumericalError, RecordingError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
+from ..recordings.recording_notes import kinematic_scale_notes
 from ..recordings.shared_samples import shared_sample_count
 from ..robot.schema import Robot, validate_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
@@ -197,6 +198,7 @@ def _result(state: Identification) -> Trace:
             *prepared.notes,
             *state.unexplained.notes,
             *_disturbance_notes(state),
+            *_kinematic_notes(state),
             *series_stiffness_notes(effects, context.robot.cable_count),
             *_initial_state_notes(state),
             *calibration_notes,
@@ -247,6 +249,14 @@ def _disturbance_notes(state: Identification) -> list[str]:
         *([f"the two recordings do not agree on {unstable}; intervals hold what both show"] if unstable else []),
         *_interval_notes(state.effects),
     ]
+
+
+def _kinematic_notes(state: Identification) -> list[str]:
+    """Notes on each winch's scale, where a drum that differs is named: its one value may stand for several."""
+    if "drum" not in [each.name for each in (*state.effects, *state.small_effects)]:
+        return []
+    robot, data_sets = state.context.robot, state.prepared.data_sets
+    return [note for data in data_sets for note in kinematic_scale_notes(robot, data.recording)]
 
 
 def _interval_notes(effects: Sequence[FoundEffect]) -> list[str]:

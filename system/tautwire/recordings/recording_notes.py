@@ -24,18 +24,32 @@ def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
     them, for whatever cause. Robots that declare effects of the kind are not judged.
     """
     declared = {setting.name for setting in robot.effects}
-    notes: list[str] = []
-    if not declared & EFFECTS_ON_POSES:
-        lag = position_lag(robot, recording)
-        scales = () if "drum" in declared else winch_scales(robot, recording, lag.seconds if lag else 0.0)
-        notes += [_lag_text(lag)] if lag else []
-        notes += [_scales_text(scales)] if scales else []
-        if not notes:
-            notes += _unexplained_travel(robot, recording)
+    lag, scales = _lag_and_scales(robot, recording)
+    notes = [_lag_text(lag)] if lag else []
+    notes += [f"{_scales_text(scales)}: {_drums_text(scales)}"] if scales else []
+    if not (notes or declared & EFFECTS_ON_POSES):
+        notes += _unexplained_travel(robot, recording)
     if not (robot.formulas or declared & EFFECTS_ON_FORCES):
         scale = load_cell_scale(robot, recording)
         notes += [_load_cell_text(scale)] if scale else []
     return tuple(f"{recording.path}: {note}" for note in notes)
+
+
+def kinematic_scale_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
+    """A note on the scale of each winch by kinematics alone, to stand beside what a trace says of drums.
+
+    Kinematics know nothing of ropes that stretch: the scales are of what the platform moved, not of what was unwound.
+    """
+    _, scales = _lag_and_scales(robot, recording)
+    return (f"{recording.path}: by kinematics alone {_scales_text(scales)}",) if scales else ()
+
+
+def _lag_and_scales(robot: Robot, recording: Recording) -> tuple[PositionLag | None, tuple[WinchScale, ...]]:
+    declared = {setting.name for setting in robot.effects}
+    if declared & EFFECTS_ON_POSES:
+        return None, ()
+    lag = position_lag(robot, recording)
+    return lag, () if "drum" in declared else winch_scales(robot, recording, lag.seconds if lag else 0.0)
 
 
 def _lag_text(lag: PositionLag) -> str:
@@ -55,14 +69,14 @@ def _scales_text(scales: tuple[WinchScale, ...]) -> str:
     cables = [scale.cable for scale in scales]
     factors = ", ".join(f"{scale.factor:.3f}" for scale in scales)
     deviation = 2.0 * max(scale.deviation for scale in scales)
-    if len(cables) == 1:
-        winches, drums = f"winch {cables[0]}", "a drum"
-    else:
-        winches, drums = f"winches {', '.join(map(str, cables[:-1]))} and {cables[-1]}", "drums"
-    return (
-        f"rope moves {factors} (+- {max(deviation, 1e-3):.1g}) of what {winches} wound: {drums} of another radius than "
-        "declared, or another factor of counts; trace tells it as drum"
-    )
+    several = f"winches {', '.join(map(str, cables[:-1]))} and {cables[-1]}"
+    winches = f"winch {cables[0]}" if len(cables) == 1 else several
+    return f"rope moves {factors} (+- {max(deviation, 1e-3):.1g}) of what {winches} wound"
+
+
+def _drums_text(scales: tuple[WinchScale, ...]) -> str:
+    drums = "a drum" if len(scales) == 1 else "drums"
+    return f"{drums} of another radius than declared, or another factor of counts; trace tells it as drum"
 
 
 def _load_cell_text(scale: LoadCellScale) -> str:
