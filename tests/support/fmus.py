@@ -8,7 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import fmpy
+import numpy as np
 from fmpy.fmi2 import FMU2Slave
+from numpy.typing import NDArray
 
 
 class Hand:
@@ -30,6 +32,14 @@ class Hand:
 
     def get(self, *names: str) -> list[float]:
         return self.fmu.getReal([self.references[name] for name in names])
+
+    def names(self, causality: str) -> list[str]:
+        return [variable.name for variable in self.description.modelVariables if variable.causality == causality]
+
+    def jacobian(self) -> NDArray[np.float64]:
+        """Partial derivatives of all outputs, by rows, with respect to all inputs."""
+        unknowns, knowns = ([self.references[name] for name in self.names(each)] for each in ("output", "input"))
+        return np.array([self.fmu.getDirectionalDerivative(unknowns, [known], [1.0]) for known in knowns]).T
 
     def set(self, **values: float) -> None:
         """Dots in names are written as double underscores."""

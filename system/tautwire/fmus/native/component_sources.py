@@ -36,6 +36,7 @@ CODE_FILE = "code.c"
 START_FILE = "start_values.c"
 STRUCTURE_FILE = "structure.h"
 EQUATIONS_FILE = "equations.c"
+SLAVE_FILES = ("slave.c", "partial_derivatives.c")
 FMI_FILES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 # The input whose rate another input is, by the names without axis.
 RATE_NAMES = {
@@ -74,7 +75,8 @@ def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: st
     ``fmi`` is the major version of FMI.
     """
     component = COMPONENTS[kind](slave, data)
-    names = ["numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", "slave.c", *FMI_FILES[fmi], *component.c_files]
+    shared = ("numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", *SLAVE_FILES)
+    names = [*shared, *FMI_FILES[fmi], *component.c_files]
     sources = {name: files(__package__).joinpath(f"c/{name}").read_text(encoding="utf-8") for name in names}
     structure = _structure(slave, component)
     return ComponentSources(
@@ -260,7 +262,7 @@ def _bound(value: float | None, absent: float) -> float:
 def _code(component: _Component, fmi: int) -> str:
     """The translation unit of everything but the start values."""
     common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h")
-    names = (*common, *component.c_files, "slave.c", f"fmi{fmi}.c")
+    names = (*common, *component.c_files, *SLAVE_FILES, f"fmi{fmi}.c")
     declarations = (
         "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n"
         "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif\n"

@@ -63,6 +63,8 @@ def _cosimulation(fmi2: Element) -> Element:
             "canBeInstantiatedOnlyOncePerProcess": "false",
             "canGetAndSetFMUState": "true",
             "canSerializeFMUState": "true",
+            "providesDirectionalDerivatives": former.attrib["providesDirectionalDerivative"],
+            "providesAdjointDerivatives": "true",
             "canHandleVariableCommunicationStepSize": "true",
             "maxOutputDerivativeOrder": former.attrib["maxOutputDerivativeOrder"],
         },

@@ -120,6 +120,7 @@ def native_description(slave: Slave, fmi: int) -> Element:
         "canNotUseMemoryManagementFunctions": "true",
         "canGetAndSetFMUstate": "true",
         "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
     }
     for name, value in options.items():
         cosimulation.set(name, value)

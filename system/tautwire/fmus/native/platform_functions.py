@@ -12,26 +12,27 @@ from tautwire_fmu.laws.effects import Effect
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add
 
-from .traced_functions import Columns, TracedFunction, rates_along, trace_function
+from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function
 
 POINT_MASS_PARAMETERS = 5
 SENSOR_SIZE = 5
 
 
 def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tuple[TracedFunction, ...]:
-    """``platform_sensor`` and ``platform_node`` of a platform's resource.
+    """``platform_sensor``, ``platform_node`` and ``platform_derivative`` of a platform's resource.
 
     ``first_effect_parameter`` parameters come before those of the effects, mass and gravity first. ``sensor`` is gain,
-    offset and delay of the measured position; a node the acceleration of the mass and its rate.
+    offset and delay of the measured position; a node the acceleration of the mass and its rate; the derivative that of
+    the acceleration with respect to the force.
     """
     effects = effects_from_resource(dict(data))
     parameters = first_effect_parameter + sum(len(effect.parameters) for effect in effects)
     mass = _Mass(effects, first_effect_parameter)
+    known = {"mass": 6, "force_and_rate": 6, "time": 1, "parameters": parameters}
     return (
         trace_function("platform_sensor", {"parameters": parameters}, mass.sensor),
-        trace_function(
-            "platform_node", {"mass": 6, "force_and_rate": 6, "time": 1, "parameters": parameters}, mass.node
-        ),
+        trace_function("platform_node", known, mass.node),
+        trace_derivative("platform_derivative", known, mass.acceleration, "force_and_rate"),
     )
 
 
@@ -49,6 +50,10 @@ class _Mass:
             each(m, effects)[1] for each in (stages.sensor_gains, stages.sensor_offsets, stages.sensor_delays)
         )
         return {"sensor": [gain, *offset, delay]}
+
+    def acceleration(self, m: Mathematics, columns: Columns) -> Columns:
+        """Acceleration under a force."""
+        return {"acceleration": self.node(m, columns)["node"][:3]}
 
     def node(self, m: Mathematics, columns: Columns) -> Columns:
         """Acceleration under a force, and its rate where position, velocity, force and time change at theirs."""

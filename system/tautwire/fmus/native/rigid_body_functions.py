@@ -41,12 +41,14 @@ from tautwire_fmu.rigid_body_variables import INERTIA_ENTRIES
 from tautwire_fmu.rotation_quadrature import ORIGIN
 
 from .platform_functions import SENSOR_SIZE, mass_functions
-from .traced_functions import Columns, TracedFunction, derivative_along, trace_function
+from .traced_functions import Columns, TracedFunction, derivative_along, trace_derivative, trace_function
 
 # Rotation matrix, and angular velocity and acceleration in the platform's axes.
 ATTITUDE_SIZE = 15
 # Moment matrix of the forces and its rate, then the external moment and its rate.
 LOAD_SIZE = 24
+# A load, and the acceleration of the centre of mass under it.
+ACTION_SIZE = LOAD_SIZE + 3
 AXES_SIZE = 9
 START_MOTION_SIZE = 6
 SYMMETRIC = {frozenset(entry): index for index, entry in enumerate(INERTIA_ENTRIES)}
@@ -71,6 +73,7 @@ def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("body_attitude", {**turning, **load, **sizes}, body.attitude),
         trace_function("body_moment", {**attitude, **load, **sizes}, body.moment),
         trace_function("body_points", points, body.points),
+        trace_derivative("body_derivative", {**turning, "action": ACTION_SIZE, **sizes}, body.reaction, "action"),
         *_step_functions(body, "two_node", 1, sizes),
         *_step_functions(body, "three_node", 2, sizes),
     )
@@ -149,6 +152,12 @@ class _Body:
             for component in add(mass[3 * k : 3 * k + 3], law.transform(matrix, arm))
         ]
         return {"points": [*points, *law.transform(rotation, velocity), *law.transform(rotation, acceleration)]}
+
+    def reaction(self, m: Mathematics, columns: Columns) -> Columns:
+        """Points as :meth:`points` has them, with the centre of mass at rest in the origin, under an action."""
+        load, acceleration = columns["action"][:LOAD_SIZE], columns["action"][LOAD_SIZE:]
+        attitude = self._attitude(m, columns, columns["quaternion"], columns["momentum"], load)
+        return self.points(m, {**columns, "attitude": attitude, "mass": [*ORIGIN, *ORIGIN, *acceleration]})
 
     def sweep(self, m: Mathematics, columns: Columns) -> Columns:
         """One sweep over the later nodes of a step: attitudes, moments, then momenta and angles."""

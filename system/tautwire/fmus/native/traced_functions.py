@@ -129,6 +129,16 @@ def derivative_along(
     return casadi.vertsplit(casadi.densify(casadi.substitute(derivative, symbols, column(values))))
 
 
+def trace_derivative(name: str, inputs: Mapping[str, int], equations: Equations, varying: str) -> TracedFunction:
+    """Trace the directional derivative of ``equations`` along ``seed``, a change of the column ``varying``."""
+
+    def derivative(m: Mathematics, columns: Columns) -> Columns:
+        outputs = equations(m, columns)
+        return {each: rates_along(values, columns[varying], columns["seed"]) for each, values in outputs.items()}
+
+    return trace_function(name, {**inputs, "seed": inputs[varying]}, derivative)
+
+
 def c_source(functions: Sequence[TracedFunction]) -> str:
     """C source of traced functions: of each a static one that returns whether all is defined, and every output finite.
 

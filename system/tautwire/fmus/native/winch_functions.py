@@ -7,7 +7,7 @@ import math
 from tautwire_fmu.laws import winch_drive as law
 from tautwire_fmu.laws.mathematics import Mathematics
 
-from .traced_functions import Columns, TracedFunction, trace_function
+from .traced_functions import Columns, TracedFunction, trace_derivative, trace_function
 
 PARAMETERS = 6
 DRIVE_SIZE = 6
@@ -15,15 +15,17 @@ DRIVE_CONSTANTS = len(law.DriveConstants._fields)
 
 
 def winch_functions() -> tuple[TracedFunction, ...]:
-    """``winch_drive``, ``winch_rates`` and ``winch_margins``; ``drive`` are what follows from the parameters.
+    """``winch_drive``, ``winch_rates``, ``winch_margins``, and ``winch_derivative`` of outputs by the command.
 
-    It is the constants of the law, the radians of the motor for each metre of rope, and the fastest rate in 1/s.
+    ``drive`` is what follows from the parameters: the constants of the law, the radians of the motor for each metre of
+    rope, and the fastest rate in 1/s.
     """
     known = {"states": 2, "command": 1, "drive": DRIVE_SIZE}
     return (
         trace_function("winch_drive", {"parameters": PARAMETERS}, _drive),
         trace_function("winch_rates", known, _rates),
         trace_function("winch_margins", known, _margins),
+        trace_derivative("winch_derivative", known, _outputs, "command"),
     )
 
 
@@ -42,3 +44,9 @@ def _rates(m: Mathematics, columns: Columns) -> Columns:
 def _margins(m: Mathematics, columns: Columns) -> Columns:
     constants = law.DriveConstants(*columns["drive"][:DRIVE_CONSTANTS])
     return {"margins": law.limit_margins(m, constants, law.DriveState(*columns["states"]), columns["command"][0])}
+
+
+def _outputs(m: Mathematics, columns: Columns) -> Columns:
+    """Outputs that depend on the command: acceleration of the rope, then the margins."""
+    acceleration, _ = _rates(m, columns)["rates"]
+    return {"outputs": [acceleration, *_margins(m, columns)["margins"]]}

@@ -183,8 +183,8 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t unknown_count,
                                         const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
                                         fmi2Real sensitivity[]) {
-  (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)sensitivity;
-  return refuse((Instance *)c, "this FMU provides no directional derivatives");
+  return (fmi2Status)get_directional_derivative(&((Instance *)c)->slave, unknowns, unknown_count, knowns, known_count,
+                                                seed, sensitivity);
 }
 
 /* Derivatives beyond the inputs that are rates are ignored: FMI allows the status discard in other functions only. */

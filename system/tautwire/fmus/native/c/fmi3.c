@@ -183,6 +183,25 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference ref
   return fmi3OK;
 }
 
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
+                                        const fmi3ValueReference knowns[], size_t known_count,
+                                        const fmi3Float64 seed[], size_t seed_count, fmi3Float64 sensitivity[],
+                                        size_t sensitivity_count) {
+  if (seed_count != known_count || sensitivity_count != unknown_count)
+    return refuse(c, "as many seeds as knowns and as many sensitivities as unknowns are needed");
+  return (fmi3Status)get_directional_derivative(&((Instance3 *)c)->slave, unknowns, unknown_count, knowns, known_count,
+                                                seed, sensitivity);
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
+                                    const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
+                                    size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count) {
+  if (seed_count != unknown_count || sensitivity_count != known_count)
+    return refuse(c, "as many seeds as unknowns and as many sensitivities as knowns are needed");
+  return (fmi3Status)get_adjoint_derivative(&((Instance3 *)c)->slave, unknowns, unknown_count, knowns, known_count,
+                                            seed, sensitivity);
+}
+
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Boolean no_rollback,
                       fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return,
                       fmi3Float64 *last_time) {

@@ -1,4 +1,4 @@
-/* Functions of FMI 3.0 for what these FMUs have not: events, clocks, binaries, derivatives, model exchange. */
+/* Functions of FMI 3.0 for what these FMUs have not: events, clocks, binaries, model exchange. */
 
 #define ABSENT(name, ...)                                         \
   fmi3Status name(__VA_ARGS__) {                                  \
@@ -40,12 +40,6 @@ ABSENT(fmi3GetNumberOfVariableDependencies, fmi3Instance c, fmi3ValueReference r
 ABSENT(fmi3GetVariableDependencies, fmi3Instance c, fmi3ValueReference reference, size_t elements[],
        fmi3ValueReference independents[], size_t independent_elements[], fmi3DependencyKind kinds[], size_t
        count)
-ABSENT(fmi3GetDirectionalDerivative, fmi3Instance c, const fmi3ValueReference unknowns[], size_t
-       unknown_count, const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[], size_t
-       seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count)
-ABSENT(fmi3GetAdjointDerivative, fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
-       const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[], size_t seed_count,
-       fmi3Float64 sensitivity[], size_t sensitivity_count)
 ABSENT(fmi3CompletedIntegratorStep, fmi3Instance c, fmi3Boolean no_rollback, fmi3Boolean *enter_event_mode,
        fmi3Boolean *terminate)
 ABSENT(fmi3SetTime, fmi3Instance c, fmi3Float64 time)

@@ -115,14 +115,27 @@ static int translate(Slave *slave, const double *start, double step, int at_end,
   return 1;
 }
 
-/* Acceleration of the mass under the present forces. */
-static int present_acceleration(const Slave *slave, const double *mass, double *acceleration) {
-  double force[6], now[6], node[6];
+static void present_force(const Slave *slave, double *now) {
+  double force[6];
   sum_forces(slave->state.real, FIRST_FORCE, FORCE_COUNT, force);
   extrapolate_vector(force, slave->state.elapsed, now);
+}
+
+/* Acceleration of the mass under the present forces. */
+static int present_acceleration(const Slave *slave, const double *mass, double *acceleration) {
+  double now[6], node[6];
+  present_force(slave, now);
   if (!node_at(slave, mass, now, platform_time(slave), node)) return 0;
   memcpy(acceleration, node, 3 * sizeof(double));
   return 1;
+}
+
+/* Change of that acceleration along a change of the inputs. */
+static int differentiate_acceleration(const Slave *slave, const double *mass, const double *seed, double *change) {
+  double now[6], force_seed[6], time = platform_time(slave);
+  present_force(slave, now);
+  sum_forces(seed, FIRST_FORCE, FORCE_COUNT, force_seed);
+  return platform_derivative(mass, now, &time, parameters_of(slave), force_seed, change);
 }
 
 /* Appends the path of this step to the delay line of the position sensor; each end has nine numbers. */

@@ -29,3 +29,9 @@ static int refresh(Slave *slave) {
   refresh_measured_position(slave, real + FIRST_STATE);
   return 1;
 }
+
+static int differentiate(const Slave *slave, const double *seed, double *change) {
+  if (!differentiate_acceleration(slave, slave->state.real + FIRST_STATE, seed, change + ACCELERATION)) return 0;
+  if (middle_is_now(slave)) memcpy(change + MIDDLE_MOTION, change + FIRST_STATE, 9 * sizeof(double));
+  return 1;
+}

@@ -159,3 +159,19 @@ static int refresh(Slave *slave) {
   refresh_measured_position(slave, real + FIRST_OUTPUT);
   return 1;
 }
+
+/* An action is a load, then the acceleration of the mass, in which the motion of all points is linear. */
+static int differentiate(const Slave *slave, const double *seed, double *change) {
+  const double *real = slave->state.real;
+  double load[LOAD_SIZE], action[LOAD_SIZE + 3] = {0.0}, action_seed[LOAD_SIZE + 3];
+  load_of(slave, real, load);
+  extrapolate_load(load, slave->state.elapsed, action);
+  load_of(slave, seed, action_seed);
+  if (!differentiate_acceleration(slave, real + MASS_STATE, seed, action_seed + LOAD_SIZE)) return 0;
+  if (!body_derivative(real + FIRST_STATE, real + MOMENTUM_STATE, action, parameters_of(slave), slave->start,
+                       action_seed, change + FIRST_OUTPUT))
+    return 0;
+  if (middle_is_now(slave))
+    memcpy(change + MIDDLE_OUTPUT, change + FIRST_ATTACHMENT_OUTPUT, POINT_SIZE * CABLE_COUNT * sizeof(double));
+  return 1;
+}

@@ -29,10 +29,16 @@ typedef struct {
 
 enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR };
 
-/* Each component has these; they return 0 where its law has no value. */
+/* Each component has these; they return 0 where its law has no value. The last one adds to `change`, which begins with
+   zeros, how the outputs change along a change `seed` of the inputs, with the states held. */
 static int derive_start(Slave *slave, double *start_states);
 static int advance(Slave *slave, double step, int at_end);
 static int refresh(Slave *slave);
+static int differentiate(const Slave *slave, const double *seed, double *change);
+
+/* Whether outputs of the middle of a step are those of now. By the model structure they depend on inputs in this mode
+   alone, and importers compress Jacobians by it. */
+static int middle_is_now(const Slave *slave) { return !slave->state.started && slave->phase == INITIALIZATION; }
 
 /* Inputs that hold at the start of a step. */
 static const double *inputs_at_start(const Slave *slave, int at_end) {

@@ -124,3 +124,9 @@ static int refresh(Slave *slave) {
   real[FIRST_OUTPUT + 1] = rates[0];
   return winch_margins(real + FIRST_STATE, &command, slave->start, real + FIRST_OUTPUT + 2);
 }
+
+static int differentiate(const Slave *slave, const double *seed, double *change) {
+  const double *real = slave->state.real;
+  double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1];
+  return winch_derivative(real + FIRST_STATE, &command, slave->start, seed + COMMAND, change + FIRST_OUTPUT + 1);
+}
