@@ -125,6 +125,19 @@ def test_calls_are_allowed_in_their_states_only(both_versions: tuple[RobotFmus, 
     fmu.doStep(0.0, 0.01)
 
 
+def test_what_is_computed_cannot_be_set(
+    both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    instance, references = extracted(both_versions[1].cables[0], tmp_path)
+    fmu = running(instance)
+    for name in ("tension", "middle_force.x", "unstrained_length", "effect.hysteresis.memory"):
+        (before,) = fmu.getFloat64([references[name]])
+        with pytest.raises(FMICallException):
+            fmu.setFloat64([references[name]], [before + 1.0])
+        assert f"{name} is no input and no parameter" in capsys.readouterr().out
+        assert fmu.getFloat64([references[name]]) == [before]
+
+
 def test_time_is_that_of_the_state(both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path) -> None:
     instance, references = extracted(both_versions[1].cables[0], tmp_path)
     first, second = running(instance), running(instance)

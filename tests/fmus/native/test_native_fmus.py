@@ -134,12 +134,13 @@ def test_serialised_states_that_are_damaged_are_refused(
 def test_a_rope_reeled_in_past_its_end_discards_the_step_and_keeps_the_state(plain_fmus: RobotFmus) -> None:
     with in_hand(plain_fmus.cables[0]) as cable:
         cable.run()
-        cable.set(unstrained_length=-1.0)
-        assert all(np.isnan(cable.get("tension", "force.x", "pull")))
+        before = cable.get("tension", "unstrained_length", "wound_length")
+        cable.set(winch_speed=1e6)
         with pytest.raises(FMICallException) as caught:
             cable.step(0.0, 0.01)
         assert caught.value.status == FMI_DISCARD
-        assert cable.get("unstrained_length", "wound_length") == [-1.0, 0.0]
+        cable.set(winch_speed=0.0)
+        assert cable.get("tension", "unstrained_length", "wound_length") == before
 
 
 def test_calls_are_allowed_in_their_states_only(plain_fmus: RobotFmus) -> None:
@@ -200,6 +201,22 @@ def test_parameters_outside_their_bounds_and_inputs_not_finite_are_refused(plain
         cable.set(position__x=float("inf"))
         with pytest.raises(FMICallException):
             cable.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("is_running", [False, True], ids=["initialization", "stepping"])
+def test_what_is_computed_cannot_be_set(
+    is_running: bool, plain_fmus: RobotFmus, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with in_hand(plain_fmus.cables[0]) as cable:
+        if is_running:
+            cable.run()
+        computed = [*cable.names("output"), *cable.names("local")]
+        before = cable.get("winch_speed", *computed)
+        for name in computed:
+            with pytest.raises(FMICallException):
+                cable.set(winch_speed=0.3, **{name.replace(".", "__"): 1.0})
+            assert f"{name} is no input and no parameter" in capsys.readouterr().out
+        assert cable.get("winch_speed", *computed) == before
 
 
 MOVING = {

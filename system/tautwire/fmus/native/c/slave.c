@@ -79,11 +79,26 @@ static int is_within_bounds(const Slave *slave, unsigned int reference, double v
   return 0;
 }
 
+/* Outputs and local variables lie between inputs and parameters. */
+static int are_settable(const Slave *slave, const unsigned int *references, size_t count) {
+  char message[300];
+  size_t k;
+  if (!are_known(slave, references, count)) return 0;
+  for (k = 0; k < count; k++)
+    if (references[k] >= INPUT_COUNT && references[k] < FIRST_PARAMETER) {
+      snprintf(message, sizeof message, "%s is no input and no parameter: it is computed, and cannot be set",
+               variable_names[references[k]]);
+      log_message(slave, STATUS_ERROR, message);
+      return 0;
+    }
+  return 1;
+}
+
 static int set_variables(Slave *slave, const unsigned int *references, size_t count, const double *values) {
   State *state = &slave->state;
   int sets_parameter = 0;
   size_t k;
-  if (!are_known(slave, references, count)) return STATUS_ERROR;
+  if (!are_settable(slave, references, count)) return STATUS_ERROR;
   for (k = 0; k < count; k++)
     if (references[k] >= FIRST_PARAMETER) {
       if (!is_within_bounds(slave, references[k], values[k])) return STATUS_ERROR;
