@@ -95,7 +95,7 @@ def build_reference_input(
         return ReferenceInput(nominal_robot, time, None, None, recording.winch_speed[:count])
     trajectory = path_trajectory(nominal_robot, path)
     duration = path.numbers["duration"] + compute.settle
-    design = None if controller == OPEN_LOOP else _designed_controller(nominal_robot, trajectory, controller)
+    design = None if controller == OPEN_LOOP else designed_controller(nominal_robot, trajectory, controller)
     if design is None:
         time = np.linspace(0.0, duration, ceil(duration / compute.step) + 1)
     else:
@@ -113,7 +113,8 @@ def build_reference_input(
     )
 
 
-def _designed_controller(robot: Robot, trajectory: Trajectory, controller: str) -> Design:
+def designed_controller(robot: Robot, trajectory: Trajectory, controller: str) -> Design:
+    """The controller of a name that is not ``none``, designed for the robot at the start of its path."""
     if controller == "feedforward":
         return Feedforward(robot.cable_count)
     if controller == "lqg":

@@ -67,10 +67,16 @@ def _run_and_summarise(
     """Runs what the dataset lacks, writes the summary and prints it; ``cluster``: scheduler or None, and workers."""
     from ..campaigns.campaign_dataset import completed_runs, open_dataset
     from ..campaigns.campaign_runner import run_campaign, run_count, write_summary
+    from ..campaigns.controller_notes import with_controller_notes
     from ..campaigns.dask_cluster import dashboard_message, dask_client
 
     new_runs = 0
     with open_dataset(out, plan, provenance):
+        with progress_bar(output) as progress:
+            progress("checking controllers", 0.0)
+            noted_plan = with_controller_notes(plan)
+        for note in noted_plan.notes[len(plan.notes) :]:
+            output.note(note)
         if not completed_runs(out, run_count(plan)).all():
             with dask_client(*cluster) as client, progress_bar(output) as progress:
                 output.note(dashboard_message(client))
@@ -79,7 +85,7 @@ def _run_and_summarise(
                 new_runs = run_campaign(plan, out, client, progress, provenance)
         with progress_bar(output) as progress:
             progress("summing up", 0.0)
-            summary = write_summary(plan, out, provenance)
+            summary = write_summary(noted_plan, out, provenance)
     run_counts = f"{run_count(plan)} runs, {new_runs} of them now, {summary['failed']} failed"
     written = {"rows": out / "runs", "summary": out / "summary.json", "page": out / "index.html"}
     output.result([run_counts, *written.values()], {**written, "made": new_runs, **summary})
