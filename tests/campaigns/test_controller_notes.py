@@ -23,7 +23,7 @@ from tautwire.control.gain_scheduling import DESIGN_POINTS
 from tautwire.robot.robot_file_writer import write_robot
 from tests.support.campaigns import read
 from tests.support.pages import section_of
-from tests.support.rigid_robots import underactuated_robot
+from tests.support.rigid_robots import hung_beam, underactuated_robot
 
 PLAN = """
 robot = "robot.toml"
@@ -53,9 +53,13 @@ def write_rows(plan: Plan, out: Path) -> None:
             parts.add([RunResult({**numbers, **identifying_columns(plan, job)})])
 
 
-def test_loops_that_small_errors_unsettle_are_named_by_path_and_controller(tmp_path: Path) -> None:
-    (note,) = with_controller_notes(plan_of(tmp_path)).notes
-    assert note.startswith(NOTE)
+def test_modes_that_winches_hardly_reach_are_named_also_of_robust_controllers(tmp_path: Path) -> None:
+    write_robot(hung_beam(), tmp_path / "robot.toml")
+    text = PLAN.replace("1.63957, -0.620978, -0.968457", "1.8, 0.0, 1.0").replace('"lqg"', '"robust", "lqg"')
+    (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+    robust, lqg = with_controller_notes(read_plan(tmp_path / "plan.toml")).notes
+    assert robust.startswith("rest, robust: at [1.8, 0, 1] m: the winches hardly reach the mode of 1.64 Hz")
+    assert robust == lqg.replace("lqg", "robust")
 
 
 @pytest.mark.validate

@@ -12,6 +12,7 @@ import pytest
 from tautwire.control import (
     ClosedLoopOptions,
     Feedforward,
+    RobustController,
     ScheduledController,
     cosimulate_closed_loop,
     design_controller,
@@ -22,7 +23,7 @@ from tautwire.control import (
     schedule_controller,
     speed_controller,
 )
-from tautwire.control.reachable_plant import reachable_plant, require_reachable
+from tautwire.control.reachable_plant import reach_notes, reachable_plant, require_reachable
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
@@ -31,7 +32,7 @@ from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors
 from tautwire.robot.trajectory import Line
 from tests.support import rigid_robots
 from tests.support.planar import HORIZONTAL, VERTICAL, Plane, robot_text
-from tests.support.rigid_robots import suspended_robot
+from tests.support.rigid_robots import hung_beam, suspended_robot
 from tests.support.robots import example
 
 HYSTERESIS = {"force": 100.0, "yield_strain": 1e-4}
@@ -48,14 +49,6 @@ def hung_point(*anchors: tuple[float, float, float]) -> Robot:
     cables = tuple(Cable(anchor, 1e10, 2e-6, 2e7, "logarithmic") for anchor in anchors)
     start = (1.4, 0.0, 0.9) if len(anchors) > 1 else (0.0, 0.0, 0.9)
     return Robot("hung", 9.81, Platform(5.0, start), None, Sensors(), cables)
-
-
-def hung_beam() -> Robot:
-    """A platform that turns, on two cables in its plane."""
-    inertia = ((1.0, 0.0, 0.0), (0.0, 0.8, 0.0), (0.0, 0.0, 1.2))
-    platform = Platform(20.0, (1.8, 0.0, 1.0), inertia=inertia, centre_of_mass=(0.0, 0.0, -0.1))
-    ends = (((0.0, 0.0, 3.0), (-0.2, 0.0, 0.1)), ((4.0, 0.0, 3.0), (0.2, 0.0, 0.1)))
-    return Robot("beam", 9.81, platform, None, Sensors(), tuple(rigid_robots.cable(*pair) for pair in ends))
 
 
 @pytest.mark.parametrize("anchors", ([(0, 0, 2), (4, 2, 2)], [(0, 0, 2), (3, 3, 2), (2, 2, 0)]), ids=("two", "three"))
@@ -171,6 +164,41 @@ def test_a_loop_that_small_errors_unsettle_is_noted() -> None:
     radii = [max(abs(control.feedback(plant, gain * feedback, 1).poles())) for gain in (1.0, 1.11, 1.0 / 1.11)]
     assert radii[0] < 1.0 < max(radii[1:])
     assert ScheduledController((0.0, 1.0), (design, design)).notes == (note, note)
+
+
+def test_a_mode_that_winches_hardly_reach_is_noted_although_margins_are_good() -> None:
+    design = design_controller(hung_beam())
+    (note,) = design.notes
+    assert note.startswith("at [1.8, 0, 1] m: the winches hardly reach the mode of 1.64 Hz, rotation about y: moving ")
+    # Feedback leaves it with little damping: by the poles of the closed loop, in 1/s.
+    poles = np.log(control.feedback(design.plant, design.regulator, 1).poles().astype(complex)) / design.aim.period
+    (swing,) = (pole for pole in poles if abs(pole.imag / (2.0 * np.pi) - 1.64) < 0.01)
+    assert -swing.real / abs(swing) < 0.01
+
+
+def test_winch_motion_of_a_mode_is_that_of_the_closed_form() -> None:
+    # Two cables of 2 m whose exit points are 0.4 mm apart: stiffness k s^2 of the ropes, T / l of the pendulum.
+    k, sine, tension = 1e10 * 2e-6 / 2.0, 1e-4, 5.0 * 9.81 / 2.0
+    robot = replace(hung_point((-2e-4, 0.0, 2.0), (2e-4, 0.0, 2.0)), platform=Platform(5.0, (0.0, 0.0, 0.0)))
+    ratio = (2.0 * k * sine**2 + 2.0 * tension / 2.0) / (np.sqrt(2.0) * k * sine)
+    (note,) = reach_notes(reachable_plant(linearise(robot)))
+    assert f"along x: moving the platform by 1 mm in it takes winch motions of {ratio:.2g} mm" in note
+    nearer = replace(hung_point((-2e-3, 0.0, 2.0), (2e-3, 0.0, 2.0)), platform=robot.platform)
+    assert reach_notes(reachable_plant(linearise(nearer))) == ()
+
+
+@pytest.mark.parametrize("robot", ("caroca", "caroca8", "cogiro", "eight", "fast", "ipanema", "three"))
+def test_winches_of_known_robots_reach_all_modes(robot: str) -> None:
+    assert reach_notes(reachable_plant(linearise(example(robot)))) == ()
+
+
+def test_a_schedule_and_a_robust_design_note_what_winches_hardly_reach() -> None:
+    design = design_controller(hung_beam())
+    (note,) = design.notes
+    assert ScheduledController((0.0, 1.0), (design, design)).notes == (note, note)
+    margins = margins_of(design.linear, design.knots()[0])
+    robust = RobustController(design.aim, design.regulator, design.tracking, design.linear, 1.0, margins)
+    assert robust.notes == (note,)
 
 
 def test_plant_within_reach_is_left_as_it_is() -> None:

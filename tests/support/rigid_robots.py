@@ -109,6 +109,14 @@ def underactuated_robot() -> Robot:
     return Robot("grab", 9.80665, platform, None, Sensors(), cables, (pulleys,))
 
 
+def hung_beam() -> Robot:
+    """A platform that turns, on two cables in its plane."""
+    inertia = ((1.0, 0.0, 0.0), (0.0, 0.8, 0.0), (0.0, 0.0, 1.2))
+    platform = Platform(20.0, (1.8, 0.0, 1.0), inertia=inertia, centre_of_mass=(0.0, 0.0, -0.1))
+    ends = (((0.0, 0.0, 3.0), (-0.2, 0.0, 0.1)), ((4.0, 0.0, 3.0), (0.2, 0.0, 0.1)))
+    return Robot("beam", 9.81, platform, None, Sensors(), tuple(cable(*pair) for pair in ends))
+
+
 def hall_robot() -> Robot:
     """Four cables without symmetry, so that the winches reach every free mode of the platform."""
     inertia = ((3.0, 0.1, -0.05), (0.1, 4.2, 0.08), (-0.05, 0.08, 5.5))

@@ -5,26 +5,31 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..control import Controller, ScheduledController
+from ..control.reachable_plant import reach_notes, reachable_plant
+from ..linear import linearise
 from ..robot.robot_file_reader import robot_from_content
-from .campaign_plan import Plan
+from ..robot.schema import Robot
+from .campaign_plan import PathPlan, Plan
 from .campaign_run import at_path_start, designed_controller, path_trajectory
-
-# Feedforward closes no loop, and robust designs keep far larger margins by construction.
-NOTED_CONTROLLERS = ("lqg", "scheduled")
 
 
 def with_controller_notes(plan: Plan) -> Plan:
-    """The plan with the notes of the LQG controllers and schedules of the declared robot, which tell of small margins.
+    """The plan with the notes of the feedback controllers of the declared robot, by path and controller.
 
     Raises what designs of controllers raise.
     """
     notes: list[str] = []
     for path_index, controller in plan.variants:
-        if controller not in NOTED_CONTROLLERS:
-            continue
-        path = plan.paths[path_index]
-        robot = at_path_start(robot_from_content(dict(plan.content), plan.file), path)
-        design = designed_controller(robot, path_trajectory(robot, path), controller)
-        if isinstance(design, Controller | ScheduledController):
-            notes += [f"{path.name}, {controller}: {note}" for note in design.notes]
+        if controller in ("lqg", "scheduled", "robust"):
+            path = plan.paths[path_index]
+            robot = at_path_start(robot_from_content(dict(plan.content), plan.file), path)
+            notes += [f"{path.name}, {controller}: {note}" for note in _notes(robot, path, controller)]
     return replace(plan, notes=(*plan.notes, *notes))
+
+
+def _notes(robot: Robot, path: PathPlan, controller: str) -> tuple[str, ...]:
+    # A robust design takes up to a minute, and keeps larger margins than are noted.
+    if controller == "robust":
+        return reach_notes(reachable_plant(linearise(robot)))
+    design = designed_controller(robot, path_trajectory(robot, path), controller)
+    return design.notes if isinstance(design, Controller | ScheduledController) else ()

@@ -20,7 +20,7 @@ from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from .design import ControlAim, Design, Knot
 from .lqg import design_controller
-from .reachable_plant import integrated_coordinates
+from .reachable_plant import integrated_coordinates, reach_notes
 from .stability_margins import margin_notes
 
 Array = NDArray[np.float64]
@@ -77,8 +77,9 @@ class ScheduledController:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """See :func:`tautwire.control.stability_margins.margin_notes`; takes up to some seconds for each point."""
-        return margin_notes(self.plants, self.knots())
+        """Those of each point, see :attr:`tautwire.control.Controller.notes`; takes up to some seconds for each."""
+        hardly_reached = (note for plant in self.plants for note in reach_notes(plant))
+        return (*hardly_reached, *margin_notes(self.plants, self.knots()))
 
     def knots(self) -> tuple[Knot, ...]:
         """See :class:`tautwire.control.Design`."""

@@ -31,7 +31,7 @@ from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from .design import ControlAim, Knot, MarginError, RegulatorDesign, regulator_signals, require_taut
 from .gain_scheduling import DESIGN_POINTS, DesignPose, ScheduledController, design_poses
-from .reachable_plant import integrated_coordinates, lowest_frequency, reachable_plant, require_reachable
+from .reachable_plant import integrated_coordinates, lowest_frequency, reach_notes, reachable_plant, require_reachable
 from .sampled_plant import ramp_plant
 from .stability_margins import Margins, Range, margins_of
 
@@ -140,6 +140,11 @@ class RobustController(RegulatorDesign):
     linear: LinearPlant
     bandwidth: float
     margins: Margins
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Modes that the winches hardly reach; see :func:`tautwire.control.reachable_plant.reach_notes`."""
+        return reach_notes(self.linear)
 
 
 def design_robust(

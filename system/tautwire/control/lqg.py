@@ -23,7 +23,7 @@ from ..linear import LinearPlant, linearise
 from ..robot.schema import Robot, validate_robot
 from ..validation import validate_instance
 from .design import ControlAim, Knot, measurement_noise, pose_signals, regulator_signals, require_taut
-from .reachable_plant import integrated_coordinates, reachable_plant, require_reachable, twist_states
+from .reachable_plant import integrated_coordinates, reach_notes, reachable_plant, require_reachable, twist_states
 from .sampled_plant import sampled_plant
 from .stability_margins import margin_notes
 
@@ -96,8 +96,8 @@ class Controller:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """See :func:`tautwire.control.stability_margins.margin_notes`; takes up to some seconds."""
-        return margin_notes((self.linear,), self.knots())
+        """Modes that winches hardly reach, and small disk margins, one line each; takes up to some seconds."""
+        return (*reach_notes(self.linear), *margin_notes((self.linear,), self.knots()))
 
     def knots(self) -> tuple[Knot, ...]:
         """See :class:`tautwire.control.Design`; one for the whole path."""
@@ -114,8 +114,8 @@ def design_controller(
 
     ``a_k = -K (x_k, w_k, z_k)``: winch accelerations (n,) in m/s^2 from the estimate of a Kalman filter, winch speeds
     and summed errors of the pose, sampled at ``aim.period``. ``aim`` holds weights and limits. The ``orientation`` of a
-    rigid platform is a unit quaternion, by default that of the robot file. ``notes`` of the design tell where its disk
-    margin is below 0.1.
+    rigid platform is a unit quaternion, by default that of the robot file. ``notes`` of the design tell which modes the
+    winches hardly reach, and where its disk margin is below 0.1.
 
     Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold
     it stably, InputError where winches do not reach a mode that does not decay, or sensors do not show it,

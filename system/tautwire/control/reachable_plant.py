@@ -11,7 +11,7 @@ Source: Zhou, Doyle and Glover (1996), Robust and Optimal Control, section 3.2.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import control
@@ -39,6 +39,8 @@ GROWTH_TOLERANCE = 1e-6
 PLANE_TOLERANCE = 1e-6
 # Of the pose's response to rope lengths: below it statics alone decides a coordinate.
 REACH_TOLERANCE = 1e-6
+# Winch motion over the platform's displacement: at most 2.3 on shipped robots, from ten on hardly any control.
+MAX_WINCH_MOTION = 10.0
 # Of the largest slope of tension along a mode.
 STRETCH_TOLERANCE = 1e-9
 # So that rounding does not decide between equal pivots: all places of a path are to have the same.
@@ -215,12 +217,39 @@ def integrated_coordinates(linear: LinearPlant) -> list[int]:
     All of them or the position, by :func:`integrated_freedoms`, as far as constant rope lengths move them independently
     of each other: of a point mass in a plane two.
     """
-    scaled = scaled_plant(linear)
-    at_rest = null_space(np.hstack([scaled.A, scaled.B]), rcond=RANK_TOLERANCE)[: len(scaled.A)]
     freedoms = integrated_freedoms(len(linear.tensions), linear.degrees_of_freedom)
-    gain = linear.system.C[:freedoms] @ (scaled.states[:, None] * at_rest)
+    gain = linear.system.C[:freedoms] @ _states_at_rest(linear)
     groups = [list(range(len(AXES))), list(range(len(AXES), freedoms))]
     return _independent_rows(gain / np.linalg.norm(gain, 2), groups, REACH_TOLERANCE)
+
+
+def _states_at_rest(linear: LinearPlant) -> Array:
+    """Basis of the states at which the plant rests, with winches at standstill."""
+    scaled = scaled_plant(linear)
+    at_rest = null_space(np.hstack([scaled.A, scaled.B]), rcond=RANK_TOLERANCE)[: len(scaled.A)]
+    states: Array = scaled.states[:, None] * at_rest
+    return states
+
+
+def reach_notes(linear: LinearPlant) -> tuple[str, ...]:
+    """One line for each mode that winches reach, but only by motions over ten times as large as the platform's.
+
+    At rest the pose is ``shapes eta``, ``eta = R dl`` by the unstrained lengths; of mode i the least ``|dl|`` for a
+    displacement by ``eta_i``, the largest of centre of mass and attachments, is ``eta_i / |R_i|``.
+    """
+    labels, freedoms = list(linear.system.state_labels), linear.degrees_of_freedom
+    at_rest = _states_at_rest(linear)
+    lengths = at_rest[[labels.index(f"unstrained_length_{i}") for i in range(1, len(linear.tensions) + 1)]]
+    pose_gain = linear.system.C[:freedoms] @ at_rest @ np.linalg.pinv(lengths)
+    modal_gains = np.linalg.norm(np.linalg.solve(linear.modes.shapes, pose_gain), axis=1)
+    return tuple(
+        f"at [{format_position(linear.position)}] m: the winches hardly reach the mode of {frequency:.3g} Hz, "
+        f"{_directions(dict(enumerate(np.abs(shape))))}: moving the platform by 1 mm in it takes winch motions of "
+        f"{1.0 / gain:.2g} mm, and feedback does little to it; arrange the cables otherwise, or shape paths so that "
+        "they do not excite it"
+        for frequency, shape, gain in zip(linear.modes.frequencies, linear.modes.shapes.T, modal_gains, strict=True)
+        if REACH_TOLERANCE < gain < 1.0 / MAX_WINCH_MOTION
+    )
 
 
 def lowest_frequency(linear: LinearPlant) -> float:
@@ -251,9 +280,12 @@ def _description(linear: LinearPlant, modes: HiddenModes) -> str:
     if modes.eigenvalue.imag == 0.0:
         return f"has a mode at standstill, of {labels[int(np.argmax(size))]},"
     moving = {twist.index(label): value for label, value in zip(labels, size, strict=True) if label in twist}
+    return f"has a mode of {modes.eigenvalue.imag / (2.0 * np.pi):.3g} Hz, {_directions(moving)},"
+
+
+def _directions(amplitudes: Mapping[int, float]) -> str:
+    """Names of the coordinates in which a mode is at least half as large as in that of its largest amplitude."""
     names = [*AXES, *(f"rotation about {axis}" for axis in AXES)]
-    most = max(moving.values())
-    directions = " and ".join(names[index] for index, value in moving.items() if value > 0.5 * most)
-    return f"has a mode of {modes.eigenvalue.imag / (2.0 * np.pi):.3g} Hz, along {directions},".replace(
-        "along rot", "rot"
-    )
+    most = max(amplitudes.values())
+    directions = " and ".join(names[index] for index, value in amplitudes.items() if value > 0.5 * most)
+    return f"along {directions}".replace("along rot", "rot")
