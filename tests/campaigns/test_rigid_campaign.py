@@ -91,24 +91,39 @@ def test_a_run_along_a_turning_path_has_its_orientations(tmp_path: Path) -> None
     assert set(result.row) <= names and {"frequency_6", "end_qw", "path_error_angle_rms"} <= names
 
 
-def test_the_page_has_angles_in_mrad_and_quaternions_without_a_unit(tmp_path: Path) -> None:
-    plan, out = plan_of(tmp_path, VARIED.replace("count = 2", "count = 16") + TURNING), tmp_path / "out"
+def test_page_and_summary_have_rotations_about_each_axis_in_mrad(tmp_path: Path) -> None:
+    start = np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0])
+    path = TURNING.replace("end =", f"start_orientation = {start.tolist()}\nend =")
+    plan, out = plan_of(tmp_path, VARIED.replace("count = 2", "count = 16") + path), tmp_path / "out"
     columns, names = row_columns(plan, 8), ("time", *series_columns(8, True))
+    angles = 0.004 * np.arange(1, run_count(plan) + 1)
     with open_dataset(out, plan), PartWriter(out, columns) as parts:
-        for index in range(run_count(plan)):
-            row: Row = {each.name: 0.01 * (1 + index % 16) for each in columns if each.kind == "number"}
+        for index, angle in enumerate(angles.tolist()):
+            row: Row = {each.name: 0.01 * (1 + index) for each in columns if each.kind == "number"}
             row |= {each.name: False for each in columns if each.kind == "flag"}
             row |= {"index": index, "sample": index, "path": "turn", "controller": "none"}
-            parts.add([RunResult(row, {name: np.full(4, 0.01 * index) for name in names})])
-    write_summary(plan, out)
-    page = Page((out / "index.html").read_text(encoding="utf-8"))
-    (variant,) = page.data()["variants"]
+            # The product of a turn about the world's z axis with the start.
+            cosine, sine = np.cos(0.5 * angle), np.sin(0.5 * angle)
+            turned = [cosine * start[0], cosine * start[1], sine * start[1], sine * start[0]]
+            row |= dict(zip([f"end_q{part}" for part in "wxyz"], turned, strict=True))
+            series = {name: np.full(4, 0.01 * index) for name in names}
+            parts.add([RunResult(row, series | {f"q{part}": np.full(4, turned[i]) for i, part in enumerate("wxyz")})])
+    spreads = {each["name"]: each for each in write_summary(plan, out)["spreads"]}
+    assert not any(name.startswith("end_q") for name in spreads)
+    assert spreads["end_rotation_z"]["unit"] == "rad" and spreads["end_rotation_z"]["largest"] == pytest.approx(0.064)
+    assert spreads["end_rotation_z"]["mean"] == pytest.approx(angles.mean())
+    assert abs(spreads["end_rotation_x"]["largest"]) < 1e-12 and abs(spreads["end_rotation_y"]["least"]) < 1e-12
+    text = (out / "index.html").read_text(encoding="utf-8")
+    (variant,) = Page(text).data()["variants"]
     units = {each["label"]: each["unit"] for each in variant["spreads"]}
-    assert (units["path error angle rms"], units["path error rms"], units["end qw"]) == ("mrad", "mm", "1")
-    assert {each["unit"] for each in variant["bands"] if each["title"] == "Orientation"} == {""}
+    assert (units["path error angle rms"], units["path error rms"], units["end rotation z"]) == ("mrad", "mm", "mrad")
+    bands = {each["label"]: each for each in variant["bands"] if each["title"] == "Rotation"}
+    assert list(bands) == ["about x", "about y", "about z"] and {each["unit"] for each in bands.values()} == {"mrad"}
+    low, high = 1e3 * np.quantile(angles, (0.025, 0.975))
+    assert float(bands["about z"]["width"]) == pytest.approx(high - low, rel=1e-2)
     (words,) = (each["words"] for each in variant["spreads"] if each["label"] == "path error angle rms")
     assert words.endswith("mrad") and float(words.split()[0]) > 10.0
-    table = section_of((out / "index.html").read_text(encoding="utf-8"), "summary").text
+    table = section_of(text, "summary").text
     assert "mrad" in table.partition("path error angle rms")[2][:40]
 
 

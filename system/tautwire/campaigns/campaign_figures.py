@@ -13,11 +13,13 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..number_format import format_significant, page_unit
+from ..recordings.quaternion_columns import rotation_vectors
 from ..reports.downsampling import evenly_spaced_indices, pack_float32
 from .campaign_dataset import SERIES_FOLDER, part_files
 from .campaign_plan import Input, Plan
 from .campaign_summary import Summary, column_values, rows_by_variant
-from .dataset_schema import ORIENTATION_COLUMNS, RowColumn, series_columns
+from .dataset_schema import ORIENTATION_COLUMNS, RowColumn
+from .platform_rotations import ROTATION_CHANNELS, start_orientations, summary_channels
 
 Array = NDArray[np.float64]
 
@@ -46,18 +48,25 @@ def quantile_bands(plan: Plan, folder: Path, variant: int, channels: tuple[str, 
     """Quantile bands of one path with one controller, of at most :data:`MAX_BAND_RUNS` runs spread evenly over all."""
     samples = np.unique(np.linspace(0, plan.count - 1, min(plan.count, MAX_BAND_RUNS)).round().astype(np.int64))
     run_indices = samples * len(plan.variants) + variant
-    point_count = plan.compute.series
-    time, quantiles, run_count = np.zeros(0), {}, 0
-    for name in ("time", *channels):
+
+    def values_of(name: str) -> Array:
         part_values = [_read_channel(part, name, run_indices) for part in part_files(folder, SERIES_FOLDER)]
-        values = np.concatenate([np.zeros(0), *part_values]).reshape(-1, max(point_count, 1))
-        if not len(values):
-            return QuantileBands(np.zeros(0), {}, 0)
-        if name == "time":
-            time, run_count = values[0], len(values)
-        else:
-            quantiles[name] = np.nanquantile(values, BAND_QUANTILE_LEVELS, axis=0)
-    return QuantileBands(time, quantiles, run_count)
+        return np.concatenate([np.zeros(0), *part_values]).reshape(-1, max(plan.compute.series, 1))
+
+    times = values_of("time")
+    if not len(times):
+        return QuantileBands(np.zeros(0), {}, 0)
+    rotations: dict[str, Array] = {}
+    if plan.is_rigid:
+        quaternions = np.stack([values_of(name).ravel() for name in ORIENTATION_COLUMNS], axis=1)
+        start = start_orientations(plan)[plan.paths[plan.variants[variant][0]].name]
+        vectors = rotation_vectors(quaternions, start).T.reshape(-1, *times.shape)
+        rotations = dict(zip(ROTATION_CHANNELS, vectors, strict=True))
+    quantiles: dict[str, Array] = {}
+    for name in channels:
+        values = rotations[name] if name in rotations else values_of(name)
+        quantiles[name] = np.nanquantile(values, BAND_QUANTILE_LEVELS, axis=0)
+    return QuantileBands(times[0], quantiles, len(times))
 
 
 def _read_channel(part: Path, name: str, run_indices: NDArray[np.int64]) -> Array:
@@ -77,7 +86,7 @@ class CampaignResults:
 
 def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[str, Any]:
     """Quantile bands and histograms of each path with each controller, packed for the page."""
-    is_grid, names = plan.method == "grid", series_columns(cable_count, plan.is_rigid)
+    is_grid, names = plan.method == "grid", summary_channels(plan, cable_count)
     band_points, grid_points = _curve_points(plan, len(names), len(numeric_outputs(results.columns)))
     variants = []
     for variant, (path, controller, rows) in enumerate(rows_by_variant(plan, results.rows)):
@@ -134,10 +143,10 @@ def column_label(name: str) -> str:
 
 def channel_description(name: str) -> tuple[str, str, str]:
     """Title, label and unit of a time series."""
-    prefix, _, cable = name.rpartition("_")
-    if prefix:
-        return "Tension", f"cable {cable}", "N"
-    return ("Orientation", name, "") if name in ORIENTATION_COLUMNS else ("Position", name, "m")
+    if name in ROTATION_CHANNELS:
+        return "Rotation", f"about {name[-1]}", "rad"
+    _, is_tension, cable = name.rpartition("_")
+    return ("Tension", f"cable {cable}", "N") if is_tension else ("Position", name, "m")
 
 
 def _band_data(bands: QuantileBands, names: Sequence[str], max_points: int) -> dict[str, Any]:

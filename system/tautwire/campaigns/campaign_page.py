@@ -32,7 +32,8 @@ from .campaign_figures import (
 from .campaign_heat_map import HEAT_KEYS, sobol_heat_maps
 from .campaign_plan import PARAMETER_NAMES, Distribution, Plan
 from .campaign_summary import FlagProbability, SobolIndices, Spread, Summary
-from .dataset_schema import RowColumn, series_columns
+from .dataset_schema import RowColumn
+from .platform_rotations import summary_channels
 from .trace_summary import IdentifiedParameter, TraceSummary
 
 # Sobol indices below this are only in the summary.
@@ -43,7 +44,7 @@ OUTPUT_GROUPS = {
     "frequency": "Frequency",
     "damping_ratio": "Damping ratio",
     "stiffness": "Stiffness",
-    "end_q": "End orientation",
+    "end_rotation": "End rotation",
     "end": "End position",
     "path_error_angle": "Orientation error",
     "path_error": "Path error",
@@ -152,7 +153,7 @@ def _band_panels(plan: Plan, robot: Robot) -> dict[str, list[tuple[int, str]]]:
     """Channel indices and labels of the bands over time, by quantity; empty where nothing moves."""
     groups: dict[str, list[tuple[int, str]]] = {}
     if plan.paths and plan.compute.series > 1:
-        for index, name in enumerate(series_columns(robot.cable_count, plan.is_rigid)):
+        for index, name in enumerate(summary_channels(plan, robot.cable_count)):
             title, label, _ = channel_description(name)
             groups.setdefault(title, []).append((index, label))
     return groups

@@ -30,6 +30,7 @@ from .campaign_summary import summarise_runs
 from .dask_cluster import SchedulerLostError, Task, context_future, task_results
 from .dataset_schema import row_columns
 from .input_sampling import draw_samples
+from .platform_rotations import with_end_rotations
 from .trace_summary import summarise_traces
 
 Array = NDArray[np.float64]
@@ -174,7 +175,7 @@ def write_summary(plan: Plan, folder: Path, provenance: Provenance | None = None
         document, page = traces.document(), trace_summary_page(plan, traces, rows, PAGE_LINKS, provenance)
     else:
         robot = robot_from_content(dict(plan.content), plan.file)
-        columns = row_columns(plan, robot.cable_count)
+        columns, rows = with_end_rotations(plan, row_columns(plan, robot.cable_count), rows)
         summary = summarise_runs(plan, columns, rows)
         results = CampaignResults(columns, rows, summary, folder)
         document, page = summary.document(), campaign_page(plan, robot, results, PAGE_LINKS, provenance)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -121,7 +121,7 @@ class Summary:
         return dict(json_value(fields))
 
 
-def summarise_runs(plan: Plan, columns: tuple[RowColumn, ...], rows: pa.Table) -> Summary:
+def summarise_runs(plan: Plan, columns: Sequence[RowColumn], rows: pa.Table) -> Summary:
     """Summarise all rows, sorted by index, by path and controller."""
     spreads: list[Spread] = []
     probabilities: list[FlagProbability] = []
