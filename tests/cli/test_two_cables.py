@@ -64,6 +64,29 @@ def test_simulation_and_check_of_its_result(tmp_path: Path, capsys: pytest.Captu
     assert "no problems found" in capsys.readouterr().out
 
 
+def test_a_new_robot_file_of_two_cables_runs_as_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["new", "pair", "--cables", "2"]) == 0
+    assert run(["check", "pair.toml"]) == 0
+    time = np.arange(51) * 0.01
+    lift = {f"winch_speed_{cable}": 0.1 * np.sin(np.pi * time / 0.5) ** 2 for cable in (1, 2)}
+    pd.DataFrame({"time": time, **lift}).to_csv("speeds.csv", index=False)
+    assert run(["simulate", "pair.toml", "--speeds", "speeds.csv", "--out", "result.csv"]) == 0
+    motion = pd.read_csv("result.csv")
+    # Exit points at x = 4 and -4, 3 m above: half of the weight is the vertical part of each tension.
+    assert motion[["tension_1", "tension_2"]].iloc[0].to_numpy() == pytest.approx(50.0 * 9.81 / 2.0 * 5.0 / 3.0)
+    assert motion[["x", "y"]].abs().max().max() < 1e-9
+    assert motion["z"].iloc[-1] - motion["z"].iloc[0] == pytest.approx(
+        3.0 - np.sqrt((5.0 - 0.025) ** 2 - 16.0), abs=2e-3
+    )
+    capsys.readouterr()
+    assert run(["linearise", "pair.toml", "--out", "plant.json"]) == 0
+    lowest = min(json.loads(Path("plant.json").read_text(encoding="utf-8"))["frequencies_hz"])
+    assert lowest == pytest.approx(np.sqrt(9.81 / 3.0) / (2.0 * np.pi), rel=1e-3)
+
+
 def test_workspace_is_the_static_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     robot, out = robot_file(tmp_path), tmp_path / "workspace.csv"
     assert run(["workspace", robot, "--out", str(out)]) == 2

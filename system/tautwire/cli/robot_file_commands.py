@@ -48,7 +48,7 @@ EXAMPLE_FILES = ("robot.toml", "fit.csv", "check.csv", "plan.toml")
 def new(
     context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name; the file is NAME.toml.")],
-    cables: Annotated[int, typer.Option(help="Number of cables.", min=3, max=12)] = 3,
+    cables: Annotated[int, typer.Option(help="Number of cables.", min=2, max=12)] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -8,7 +8,7 @@ from textwrap import fill
 
 from tautwire_fmu.laws.effects import ALL
 
-MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES = 3, 12
+MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES = 2, 12
 
 TEMPLATE_HEAD = """\
 # A cable-driven robot. SI units throughout; z points up; cables count from 1 in the order of this file.
@@ -19,11 +19,11 @@ gravity = 9.81                    # m/s^2
 
 [platform]
 mass = 50.0                       # kg, a point mass
-start = [0.0, 0.0, 2.0]           # m, where every run starts at rest
+start = [0.0, 0.0, 2.0]           # m, where every run starts at rest; on two cables in their plane
 # mass_uncertainty = 0.5          # kg, how far the true mass may be from that; a standard deviation, as all of these
 
 # A platform that turns: with an inertia it is a rigid body, start is the origin of its frame, and each cable has an
-# attachment in that frame. Two cables are enough then.
+# attachment in that frame.
 # inertia = [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 6.0]]  # kg m^2, about the centre of mass, in its axes
 # centre_of_mass = [0.0, 0.0, 0.1]           # m, in the platform's frame; 0 when absent
 # start_orientation = [1.0, 0.0, 0.0, 0.0]   # unit quaternion w, x, y, z, platform to world; none when absent
@@ -107,10 +107,11 @@ TEMPLATE_TAIL = """
 """
 
 
-def new_robot_text(name: str, cable_count: int = MIN_TEMPLATE_CABLES) -> str:
-    """The text of a template robot file with 3 to 12 cables, which can be built and run as it is.
+def new_robot_text(name: str, cable_count: int = 3) -> str:
+    """The text of a template robot file with 2 to 12 cables, which can be built and run as it is.
 
-    Exit points lie evenly on a circle above the platform; from six cables on, every second one below it.
+    Exit points lie evenly on a circle above the platform, two in a plane with it; from six cables on, every second one
+    below it.
     """
     has_lower_anchors = cable_count >= 6
     head = TEMPLATE_HEAD.format(
