@@ -158,8 +158,9 @@ def test_steps_chosen_by_a_tolerance_keep_it(three_fmus: RobotFmus, tolerance: f
             "</TypeDefinitions><LogCategories>",
         },
         {' unit="m"': ' unit="metre"', '<Unit name="m">': '<Unit name="metre">'},
+        {' unit="m"': ""},
     ],
-    ids=["declared type", "another name"],
+    ids=["declared type", "another name", "none"],
 )
 def test_lengths_count_for_the_tolerance_however_their_unit_is_stated(
     three_fmus: RobotFmus, tmp_path: Path, changes: dict[str, str]

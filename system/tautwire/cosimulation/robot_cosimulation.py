@@ -272,7 +272,8 @@ def record_cosimulation(
     """
     _require_step_support(fmus, experiment)
     wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
-    experiment = replace(experiment, input_source=SelectedInputs(experiment.input_source, wiring.external_indices))
+    source = SelectedInputs(experiment.input_source, wiring.external_indices)
+    experiment = replace(experiment, input_source=source, output_units=wiring.output_units)
     build_system = partial(instantiate_robot, fmus, additional=additional, start=float(experiment.times[0]))
     if call_timeout is not None:
         return simulate_isolated(build_system, experiment, wiring.outputs, recorder, progress, call_timeout)

@@ -25,12 +25,14 @@ class RobotWiring(Wiring):
     """The wiring of a robot whose FMUs may lack some ports, and its recorded outputs.
 
     ``external_inputs`` are the entries of :func:`winch_input_ports` at ``external_indices``; ``outputs`` are the
-    entries of :func:`recorded_ports` at ``output_indices``, and ``missing_columns`` the columns of the others.
+    entries of :func:`recorded_ports` at ``output_indices``, in ``output_units``, and ``missing_columns`` the columns of
+    the others.
     """
 
     external_indices: tuple[int, ...]
     outputs: tuple[Port, ...]
     output_indices: tuple[int, ...]
+    output_units: tuple[str, ...]
     missing_columns: tuple[str, ...]
 
 
@@ -62,6 +64,7 @@ def wire_robot(
         event_indicators=tuple(_available_ports(event_indicator_ports(cable_count, winches), missing_ports).values()),
         outputs=tuple(outputs.values()),
         output_indices=tuple(outputs),
+        output_units=tuple(columns[index].unit for index in outputs),
         missing_columns=tuple(c.name for index, c in enumerate(columns) if index not in outputs),
     )
 

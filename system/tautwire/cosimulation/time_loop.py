@@ -93,11 +93,15 @@ class MemoryRecorder:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment: its external inputs, the grid ``times`` (N,) of its recorded rows, and the steps between them."""
+    """An experiment: its external inputs, the grid ``times`` (N,) of its recorded rows, and the steps between them.
+
+    ``output_units`` are those of the observed outputs, for outputs whose FMU states none.
+    """
 
     input_source: InputSource
     times: Array
     step_size_control: StepSizeControl
+    output_units: tuple[str, ...] = ()
 
 
 def simulate(
@@ -115,7 +119,7 @@ def simulate(
 
     Raises ComponentError where an FMU fails or has an output that is not finite; the recorder has the rows until then.
     """
-    observed = _ObservedOutputs(coupling, observed_outputs)
+    observed = _ObservedOutputs(coupling, observed_outputs, experiment.output_units)
     begin = float(experiment.times[0])
     start, _ = experiment.input_source.interval(0, begin, 0.0, observed.row)
     coupling.solve_initial_values(begin, start)
@@ -158,13 +162,17 @@ def _run_loop(
 class _ObservedOutputs:
     """Reads the observed outputs, and those of them that are lengths, in metres; ``row`` is that of the last time."""
 
-    def __init__(self, coupling: CouplingSolver, ports: Sequence[Port]) -> None:
+    def __init__(self, coupling: CouplingSolver, ports: Sequence[Port], assumed_units: Sequence[str]) -> None:
         self._coupling = coupling
         self._blocks: list[tuple[Component, VariableBlock, NDArray[np.intp]]] = []
         components = coupling.graph.components
         self.row = np.zeros(len(ports))
         units = [unit_at(components, port) for port in ports]
-        self._length_mask = np.array([unit[0] is not None and same_unit(unit, METRE) for unit in units], dtype=bool)
+        is_length = [
+            same_unit(unit, METRE) if unit[0] is not None else assumed == METRE[0]
+            for unit, assumed in zip(units, assumed_units or [""] * len(ports), strict=True)
+        ]
+        self._length_mask = np.array(is_length, dtype=bool)
         for name in dict.fromkeys(port.component for port in ports):
             indices = [i for i, port in enumerate(ports) if port.component == name]
             block = components[name].block([ports[i].variable for i in indices])
