@@ -6,6 +6,7 @@ import pytest
 from tautwire.errors import UnreachableError
 from tautwire.recordings.recording import Recording
 from tautwire.recordings.start_position import start_pose, start_position, with_start
+from tautwire.robot.schema import Platform, Robot
 from tests.support.pose_recordings import noisy, rotation_of, wandering_recording
 from tests.support.recordings import recorded
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
@@ -58,6 +59,42 @@ def test_a_planar_robot_starts_in_its_plane_wherever_noise_shows_it() -> None:
     assert planar.axes_in_plane == (0, 2)
     recording = replace(FIT, position=np.tile([x, 0.5, z], (len(FIT.time), 1)))
     assert start_position(planar, NOISE, recording)[0] == (x, 0.0, z)
+
+
+ALONG, ACROSS = np.array([0.8, 0.6, 0.0]), np.array([-0.6, 0.8, 0.0])
+
+
+def oblique_robot(cables: int) -> Robot:
+    """A point mass on cables in a vertical plane that is turned by 37 degrees about z."""
+    anchors = [3.0 * ALONG, np.array([0.0, 0.0, 3.0]), 3.0 * ALONG + [0.0, 0.0, 3.0]][-cables:]
+    x, y, z = 1.4 * ALONG + [0.0, 0.0, 0.9]
+    hung = [replace(ROBOT.cables[0], anchor=tuple(anchor.tolist())) for anchor in anchors]
+    return replace(ROBOT, platform=Platform(50.0, (x, y, z)), cables=tuple(hung))
+
+
+def started_at(point: np.ndarray) -> Recording:
+    """A recording at rest at a point, in m."""
+    return replace(
+        FIT, position=np.tile(point, (len(FIT.time), 1)), winch_speed=0.0 * FIT.winch_speed, rope_length=None
+    )
+
+
+@pytest.mark.parametrize("cables", (2, 3))
+def test_noise_does_not_lead_a_start_out_of_an_oblique_plane(cables: int) -> None:
+    robot, elsewhere = oblique_robot(cables), 1.6 * ALONG + [0.0, 0.0, 1.1]
+    start, notes = start_position(robot, NOISE, started_at(elsewhere + 2.0 * NOISE * ACROSS))
+    assert start == pytest.approx(elsewhere, abs=1e-12)
+    assert "the run starts there too" in notes[0]
+
+
+def test_an_axis_without_positions_keeps_the_start_in_an_oblique_plane() -> None:
+    start, _ = start_position(oblique_robot(2), NOISE, started_at(np.array([1.28, np.nan, 1.1])))
+    assert start == pytest.approx(1.6 * ALONG + [0.0, 0.0, 1.1], abs=1e-12)
+
+
+def test_a_start_beside_an_oblique_plane_by_more_than_noise_is_refused() -> None:
+    with pytest.raises(UnreachableError, match=r"it is 0\.05 m beside it"):
+        start_position(oblique_robot(2), NOISE, started_at(1.6 * ALONG + [0.0, 0.0, 1.1] + 0.05 * ACROSS))
 
 
 def test_a_start_that_the_cables_cannot_hold_names_the_recording() -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import UnreachableError
 from ..robot.measured_start import shown_position, with_measured_start, with_true_start
@@ -16,7 +17,11 @@ from .mistaken_orientation import angle_between
 from .recording import Recording
 from .white_noise_estimate import white_noise_deviation
 
+Array = NDArray[np.float64]
+
 START_SIGNIFICANCE = 6.0
+# Of a plane's unit normal, and of its largest dimension.
+PLANE_TOLERANCE = 1e-9
 # The robot starts at rest: its first samples are of one position.
 START_ROWS, MAX_START_SAMPLES = 10, 5
 # Fewer cables leave the orientation of a rigid platform to statics.
@@ -41,8 +46,9 @@ def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tup
     """The start pose of a recording, and notes where it differs significantly from the robot file's.
 
     Its position is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without
-    positions starts as declared, and so does the one across the plane of a planar robot. Its orientation is the robot
-    file's, or that of the first samples where six cables or more hold a rigid platform: fewer decide it by statics.
+    positions starts as declared, and so does the one across the plane of a planar robot; out of an oblique plane noise
+    does not lead. Its orientation is the robot file's, or that of the first samples where six cables or more hold a
+    rigid platform: fewer decide it by statics.
 
     Raises RecordingError where the recording cannot be this robot's, UnreachableError where the cables cannot hold the
     platform there; both name the recording.
@@ -79,6 +85,7 @@ def _start_position(
             _require_holdable(with_start(robot, robot.platform.start, orientation), recording)
         return robot.platform.start, ()
     start = np.where(np.isfinite(uncertainty), expected + offset, robot.platform.start)
+    start += _step_into_plane(robot, offset, uncertainty)
     x, y, z = start.tolist()
     where = f"{recording.path}: first positions"
     require_start_within_robot(robot, start, where)
@@ -90,6 +97,24 @@ def _start_position(
         "the zero of the position sensor is wrong"
     )
     return (x, y, z), (note,)
+
+
+def _step_into_plane(robot: Robot, offset: Array, uncertainty: Array) -> Array:
+    """The most likely step (3,) in m from a measured start into the plane of a planar robot; 0 if noise is no reason.
+
+    An axis without positions takes all of it; ``offset`` (3,) in m is the measured one from the declared start.
+    """
+    _, sizes, directions = np.linalg.svd(np.subtract(robot.anchors, robot.platform.start))
+    if robot.platform.is_rigid_body or (len(sizes) == 3 and sizes[2] > PLANE_TOLERANCE * sizes[0]):
+        return np.zeros(3)
+    normal, is_unknown = directions[2], np.isinf(uncertainty)
+    is_free = is_unknown & (np.abs(normal) > PLANE_TOLERANCE)
+    variances = is_free.astype(float) if np.any(is_free) else np.where(is_unknown, 0.0, uncertainty) ** 2
+    distance, variance = float(normal @ offset), float(variances @ normal**2)
+    if variance == 0.0 or not (np.any(is_free) or abs(distance) <= START_SIGNIFICANCE * variance**0.5):
+        return np.zeros(3)
+    step: Array = -distance * variances * normal / variance
+    return step
 
 
 def _require_holdable(robot: Robot, recording: Recording, described: str = "") -> None:
