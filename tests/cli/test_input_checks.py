@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tautwire.cli import input_checks
+from tautwire.cli import input_checks, run
 from tautwire.cli.input_checks import Problem, check_files
 from tautwire.errors import InputError, RecordingError, RobotFileError
 from tautwire.estimation import trace
@@ -273,6 +273,32 @@ def test_check_that_is_fit_is_refused() -> None:
     with pytest.raises(RecordingError, match="has all of its 4001 samples in common with FIT") as caught:
         trace(robot, fit, read_recording(THREE / "fit.csv", 3))
     assert "a recording of another motion" in caught.value.hint
+
+
+def test_check_reads_the_second_recording_and_tells_a_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    second, fit = tmp_path / "second.csv", pd.read_csv(THREE / "fit.csv")
+    fit[500:].assign(time=fit["time"][500:] - 5.0).round(5).to_csv(second, index=False)
+    files = [str(THREE / "robot.toml"), str(THREE / "fit.csv"), "--check"]
+    assert run(["check", *files, str(second)]) == 2
+    assert "samples in common with FIT" in capsys.readouterr().out
+    assert run(["check", *files, str(THREE / "check.csv")]) == 0
+    shown = capsys.readouterr()
+    assert f"{THREE / 'check.csv'}: no problems found" in shown.out
+    assert f"--check {THREE / 'check.csv'} --out report/" in shown.err
+    second.write_text("time,winch_speed_1\n0,0\n", encoding="utf-8")
+    assert run(["check", *files, str(second)]) == 2
+    assert str(second) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [(["--check", "second.csv"], "--check"), (["--check-tracker", "tracker.csv"], "--check-tracker")],
+)
+def test_options_of_a_second_recording_need_it(
+    capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    assert run(["check", str(THREE / "robot.toml"), *options]) == 2
+    assert f"{said}: is given without" in capsys.readouterr().err
 
 
 LINES = (THREE / "robot.toml").read_text(encoding="utf-8").split("\n")

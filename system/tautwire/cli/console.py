@@ -86,11 +86,11 @@ def columns_command(recording: Path, source: str, tracker: Path | None = None) -
     return f"tautwire columns {shell_quoted(recording)} {source}{of_tracker}"
 
 
-def trace_command(robot_file: Path, recording: Path, columns: Path | None, tracker: Path | None = None) -> str:
-    """A trace of the recording as a shell command, to be pasted."""
-    files = {"--columns": columns, "--tracker": tracker}
-    options = "".join(f" {option} {shell_quoted(path)}" for option, path in files.items() if path is not None)
-    return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{options} --out report/"
+def trace_command(robot_file: Path, recording: Path, **options: Path | None) -> str:
+    """A trace of the recording as a shell command, to be pasted; options by name, such as ``check_tracker``."""
+    files = {f"--{name.replace('_', '-')}": path for name, path in options.items()}
+    given = "".join(f" {option} {shell_quoted(path)}" for option, path in files.items() if path is not None)
+    return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{given} --out report/"
 
 
 QUATERNION_NORM_TOLERANCE = 1e-3

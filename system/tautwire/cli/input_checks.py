@@ -17,6 +17,7 @@ from ..recordings.mdf_file import is_mdf
 from ..recordings.mistaken_orientation import orientation_notes
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.recording_notes import recording_notes
+from ..recordings.shared_samples import require_unseen
 from ..recordings.start_position import start_pose
 from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
@@ -110,6 +111,15 @@ def check_files(
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
     return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
+
+
+def check_both(fit: CheckResult, check: CheckResult) -> CheckResult:
+    """The results of both recordings of a trace, and whether the second was seen in the first."""
+    problems = list(dict.fromkeys((*fit.problems, *check.problems)))
+    if fit.recording is not None and check.recording is not None:
+        with _collecting_problems(problems, Path(check.recording.path)):
+            require_unseen(fit.recording, check.recording)
+    return replace(fit, problems=tuple(problems), notes=tuple(dict.fromkeys((*fit.notes, *check.notes))))
 
 
 def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:

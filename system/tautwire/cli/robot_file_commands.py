@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -160,8 +160,14 @@ def check(
         Path | None,
         typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet, MDF, .mat or a ROS bag."),
     ] = None,
+    second: Annotated[
+        Path | None, typer.Option("--check", metavar="CHECK.csv", help="The recording for validation, checked too.")
+    ] = None,
     columns: Columns = None,
     tracker: TrackerFile = None,
+    second_tracker: Annotated[
+        Path | None, typer.Option("--check-tracker", metavar="TRACKER.csv", help="Tracker file of CHECK.csv.")
+    ] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html", help="Output page: what the check read, and its problems.")
     ] = None,
@@ -171,24 +177,24 @@ def check(
     """Check a robot file and a recording, and list every problem.
 
     Each problem is a line, which names the line of the file; the exit status is 2 if there are problems. Otherwise it
-    says what a trace would do to the recording before looking at it. --report draws what was read, also if there are
-    problems.
+    says what a trace would do to the recording before looking at it. --check takes the second recording of a trace too,
+    and tells whether it is another one. --report draws what was read of the first, also if there are problems.
 
     Example: tautwire check robot.toml recording.csv --report check.html
     """
     from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs
-    from .input_checks import check_files
+    from .input_checks import check_both, check_files
 
-    if columns is not None and recording is None:
-        raise InputError("--columns", "is given without a recording", "name the recording that has these columns")
-    if tracker is not None and recording is None:
-        raise InputError("--tracker", "is given without a recording", "name the winches' log of the same motion")
-    inputs = [path for path in (robot_file, recording, columns, tracker) if path]
+    files = {"columns": columns, "tracker": tracker, "check": second, "check_tracker": second_tracker}
+    _require_logs(recording, files)
+    inputs = [path for path in (robot_file, recording, *files.values()) if path]
     refuse_other_formats(report, ".html", option="--report")
     refuse_overwriting_inputs(inputs, [report] if report else [])
     output = CommandOutput(as_json, quiet)
     with progress_bar(output) as progress:
         result = check_files(robot_file, recording, progress, columns, tracker)
+        if second is not None:
+            result = check_both(result, check_files(robot_file, second, progress, columns, second_tracker))
         # Of folders only a bag that was read has its files hashed.
         readable = (
             path
@@ -213,15 +219,31 @@ def check(
         )
         raise typer.Exit(EXIT_WRONG_INPUT)
     if not as_json:
-        output.result([f"{file}: no problems found" for file in (robot_file, recording, tracker) if file], {})
+        output.result(
+            [f"{file}: no problems found" for file in (robot_file, recording, tracker, second, second_tracker) if file],
+            {},
+        )
     if recording is None:
         next_command = f"tautwire build {shell_quoted(robot_file)} --out build/"
         output.suggest_next(f"{next_command}; with a recording of the robot add RECORDING.csv to this check")
     else:
-        next_command = trace_command(robot_file, recording, columns, tracker)
-        second = f"--check SECOND{recording.suffix}"
-        second += f" --check-tracker ITS_TRACKER{tracker.suffix}" if tracker else ""
-        output.suggest_next(f"{next_command}; with a second recording of the robot add {second}")
+        next_command = trace_command(robot_file, recording, **files)
+        option = f"--check SECOND{recording.suffix}"
+        option += f" --check-tracker ITS_TRACKER{tracker.suffix}" if tracker else ""
+        hint = "" if second else f"; with a second recording of the robot add {option}"
+        output.suggest_next(f"{next_command}{hint}")
+
+
+def _require_logs(recording: Path | None, files: Mapping[str, Path | None]) -> None:
+    """Raises InputError where an option is given without the recording that it belongs to."""
+    if recording is None and files["columns"] is not None:
+        raise InputError("--columns", "is given without a recording", "name the recording that has these columns")
+    if recording is None and files["tracker"] is not None:
+        raise InputError("--tracker", "is given without a recording", "name the winches' log of the same motion")
+    if recording is None and files["check"] is not None:
+        raise InputError("--check", "is given without a recording", "name the recording that is fitted before it")
+    if files["check"] is None and files["check_tracker"] is not None:
+        raise InputError("--check-tracker", "is given without --check", "name the winches' log of the same motion")
 
 
 def _write_report(result: CheckResult, target: Path, inputs: Sequence[Path], provenance: Provenance) -> bool:

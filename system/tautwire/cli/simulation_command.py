@@ -160,7 +160,7 @@ def _simulate_recording(
     written = {"result": files.out} | ({"report": report} if report else {})
     _print_statistics(statistics, notes, written, provenance, output)
     if not robot.platform.is_rigid_body:
-        next_command = trace_command(files.robot, files.speeds, files.columns)
+        next_command = trace_command(files.robot, files.speeds, columns=files.columns)
         output.suggest_next(f"{next_command}, if positions or tensions were measured too")
 
 

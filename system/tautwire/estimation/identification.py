@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ..errors import ArgumentError, NumericalError, RecordingError
+from ..errors import ArgumentError, NumericalError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
 from ..recordings.recording_notes import kinematic_scale_notes
-from ..recordings.shared_samples import shared_sample_count
+from ..recordings.shared_samples import require_unseen
 from ..robot.schema import Robot, validate_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .effect_estimates import parameter_correlations, series_stiffness_notes, with_readable_values
@@ -33,7 +33,6 @@ from .trace_result import Comparison, FoundEffect, Trace
 from .verdict import confirmed_formula
 from .worker_pool import WorkerPool
 
-MAX_SHARED_SAMPLES = 0.1  # of those that validate
 FALSE_ALARM_RATE_RULE = NumberRule("a false-alarm rate below 1, such as 0.01", "", positive=True)
 
 
@@ -62,17 +61,7 @@ def validate_trace_arguments(
             raise ArgumentError(argument, recording, problem, "give a recording of this robot")
         require_outputs(recording)
     if check is not None:
-        _require_unseen(fit, check)
-
-
-def _require_unseen(fit: Recording, check: Recording) -> None:
-    """Raises RecordingError where too many samples of a recording were fitted."""
-    shared = shared_sample_count(check, fit)
-    if shared >= MAX_SHARED_SAMPLES * check.sample_count:
-        count = "all" if shared == check.sample_count else f"{shared}"
-        problem = f"has {count} of its {check.sample_count} samples in common with FIT, which they cannot validate"
-        hint = "give a recording of another motion, or none: then the second half of FIT validates"
-        raise RecordingError(check.path, problem, hint)
+        require_unseen(fit, check)
 
 
 def validated_false_alarm_rate(argument: str, value: object) -> float:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from ..errors import RecordingError
 from .recording import Recording
 from .white_noise_estimate import white_noise_deviation
 
@@ -14,6 +15,17 @@ Array = NDArray[np.float64]
 # Digits that a file leaves out change a sample by less than its noise.
 TOLERANCE_IN_NOISE = 0.1
 RELATIVE_TOLERANCE = 1e-6
+MAX_SHARED_SAMPLES = 0.1  # of those that validate
+
+
+def require_unseen(fit: Recording, check: Recording) -> None:
+    """Raises RecordingError where too many samples of a recording that validates were fitted."""
+    shared = shared_sample_count(check, fit)
+    if shared >= MAX_SHARED_SAMPLES * check.sample_count:
+        count = "all" if shared == check.sample_count else f"{shared}"
+        problem = f"has {count} of its {check.sample_count} samples in common with FIT, which they cannot validate"
+        hint = "give a recording of another motion, or none: then the second half of FIT validates"
+        raise RecordingError(check.path, problem, hint)
 
 
 def shared_sample_count(recording: Recording, other: Recording) -> int:
