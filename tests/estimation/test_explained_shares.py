@@ -14,6 +14,7 @@ from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.explained_shares import (
     amplitude_spread,
     as_declared,
+    explained_shares,
     missed_with_effects,
     missed_without_effects,
     remaining_error,
@@ -26,8 +27,8 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.smoothed_states import with_initial_state
-from tautwire.estimation.trace_result import Errors
-from tautwire.robot.schema import EffectSetting
+from tautwire.estimation.trace_result import Comparison, Errors
+from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -170,6 +171,28 @@ def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_mis
     left = missed_with_effects(FITTER, LOADED, SPLIT.validation, floor)
     assert missed > 50.0
     assert left < 0.02 * missed
+
+
+def test_effects_that_cancel_change_less_together_than_each_alone() -> None:
+    loaded = [Hypothesis(BY_NAME["payload"], ())]
+    assert sizes_of(LOADED, loaded)[0] == pytest.approx(sizes_of(LOADED, loaded)[1])
+    # About what the load adds to the tensions of inclined ropes.
+    force = -2.0 * 12.0 * ROBOT.gravity / ROBOT.cable_count
+    values = BY_NAME["sensor_offset"].completed_values({"tension_offset": force})
+    cancelled = LOADED.with_effect(EffectSetting("sensor_offset", values, ROBOT.cable_numbers))
+    offsets = Hypothesis(BY_NAME["sensor_offset"], ROBOT.cable_numbers, ("tension_offset",))
+    payload, offset, together = sizes_of(cancelled, [*loaded, offsets])
+    assert together < 0.7 * min(payload, offset)
+
+
+def sizes_of(robot: Robot, accepted: list[Hypothesis]) -> tuple[float, ...]:
+    """What each effect of a robot changes, then all together."""
+    data, fit = SPLIT.validation, Fit.without_parameters(robot)
+    run = simulated_outputs(FITTER, with_initial_state(FITTER, robot, data), data)
+    errors = noise_floor(FITTER, robot, data)
+    after = Comparison("check", data.recording, run, run, errors, errors)
+    shares = explained_shares(IdentificationContext(ROBOT, FITTER, SPLIT), FITTER, fit, accepted, data, after)
+    return *shares.sizes, shares.size_together
 
 
 @pytest.mark.parametrize("cables", [(1, 2, 3), (2,)])

@@ -49,7 +49,7 @@ def with_effects(*names: str, **spreads: float) -> Identification:
 def shares_of(selection: SelectionResult, spreads: dict[str, float], share: float = 0.6) -> ExplainedShares:
     count = len(selection.accepted)
     by_effect = tuple(spreads[hypothesis.effect.name] for hypothesis in selection.accepted)
-    return ExplainedShares((share,) * count, (20.0,) * count, by_effect, (0.0,) * count, 1.0 - share, 30.0, 20.0)
+    return ExplainedShares((share,) * count, (20.0,) * count, by_effect, (0.0,) * count, 1.0 - share, 30.0, 20.0, 0.0)
 
 
 @pytest.mark.parametrize(

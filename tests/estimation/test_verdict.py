@@ -37,7 +37,7 @@ def shares(left: float, missed: float, **of_effects: tuple[float, float]) -> Exp
     """Shares with (share, size) of each effect; what is left has its part of the mean square of what is missed."""
     parts, sizes = ([pair[k] for pair in of_effects.values()] for k in (0, 1))
     none = (0.0,) * len(parts)
-    return ExplainedShares(tuple(parts), tuple(sizes), none, none, left, missed, missed * left**0.5)
+    return ExplainedShares(tuple(parts), tuple(sizes), none, none, left, missed, missed * left**0.5, 0.0)
 
 
 def selected(*accepted: Hypothesis, robot: Robot = ROBOT) -> SelectionResult:
@@ -215,3 +215,9 @@ def test_effects_that_nearly_cancel_each_other_get_no_name() -> None:
     assert word == "unexplained"
     assert "would go to payload and sensor_offset" in sentence
     assert sentence.endswith(", which would nearly cancel each other.")
+
+
+def test_an_effect_that_uncertain_numbers_imitate_well_cancels_none() -> None:
+    of = shares(0.02, 28.0, payload=(0.98, 121.0))
+    assert verdict(of, "payload")[0] == "unexplained"
+    assert verdict(replace(of, size_together=121.0), "payload")[0] == "effects"

@@ -12,13 +12,15 @@ a value each is one effect.
 An effect is the same from beginning to end; what is only like it now and then would need another size on each stretch.
 One whose state settles has a time constant that shows; without, it is only like another effect: a relaxation that takes
 far longer than the motion is a modulus, a far faster one damping. A slow drift stays a drift. Effects of which each
-changes far more than is missed nearly cancel each other, and what they leave shows none of them.
+changes far more than is missed, and than all of them together, nearly cancel each other, and what they leave shows none
+of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from statistics import median
 
 import numpy as np
@@ -52,7 +54,8 @@ class ExplainedShares:
     ``sizes`` are those of what each effect changes in the outputs, ``spreads`` how much they differ by stretch, see
     :func:`amplitude_spread`, and ``time_deviations`` how well their time constants show, see the function of that name.
     ``size_missed`` is the size of what the robot without effects misses beside noise, its
-    uncertain numbers at their best, ``size_left`` that of what is left.
+    uncertain numbers at their best, ``size_left`` that of what is left, and ``size_together`` that of what all effects
+    change, the uncertain numbers as they are beside them.
     """
 
     effects: tuple[float, ...]
@@ -62,6 +65,7 @@ class ExplainedShares:
     left: float
     size_missed: float
     size_left: float
+    size_together: float
 
     @property
     def explained(self) -> float:
@@ -90,8 +94,11 @@ class ExplainedShares:
         return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]
 
     def uncancelled(self, policy: SizePolicy) -> list[int]:
-        """Indices of the effects that change the outputs by few times what is missed: none nearly cancels another."""
-        largest = policy.max_size_to_missed * self.size_missed
+        """Indices of the effects that change the outputs by few times what is missed: none nearly cancels another.
+
+        Or by few times what all together change: uncertain numbers may imitate one so well that little is missed.
+        """
+        largest = policy.max_size_to_missed * max(self.size_missed, self.size_together)
         return [index for index, size in enumerate(self.sizes) if size <= largest]
 
     def timed(self, policy: SizePolicy) -> list[int]:
@@ -116,8 +123,9 @@ def explained_shares(
     floor = sensor_noise_floor(context.fitter, robot, data)
     at_start = with_initial_state(context.fitter, robot, data)
     names = list(dict.fromkeys(hypothesis.effect.name for hypothesis in accepted))
-    robots = [at_start, *(as_declared(at_start, name, accepted, context.robot) for name in names)]
-    complete, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
+    without_any = reduce(lambda each, name: as_declared(each, name, accepted, context.robot), names, at_start)
+    robots = [at_start, without_any, *(as_declared(at_start, name, accepted, context.robot) for name in names)]
+    complete, outputs_without_any, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
     recording, outputs_without = after.recording, dict(zip(names, without, strict=True))
     missed = missed_without_effects(context, declared, data, floor)
     left = _missed(recording, after.after, floor)
@@ -138,6 +146,7 @@ def explained_shares(
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,
+        _size(output_residuals(complete, outputs_without_any), recording, floor),
     )
 
 

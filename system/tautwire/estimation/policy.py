@@ -234,8 +234,8 @@ class SizePolicy:
     # Half-width of an effect's amplitude over stretches, relative to it, above which it is none: two tanks that fill
     # were payloads with 0.37 and 0.39; drag, linear in speed, had 0.03 to 0.12 on three lifelike recordings.
     max_amplitude_spread: float = 0.3
-    # Size of an effect over that of what is missed above which others nearly cancel it: a bungee on three cables was a
-    # hanging load and offsets of all load cells with 9.5 and 8.7; effects of the list had 2.0 at most.
+    # Size of an effect over that of what is missed, or of what all effects change if that is larger, above which others
+    # nearly cancel it: a bungee was a hanging load and offsets of load cells with 9.5 and 8.7; listed ones had 2.0.
     max_size_to_missed: float = 4.0
     # Standard deviation of a time constant, relative to it, above which no delay of the effect shows. A rope that
     # stiffens with its tension was a relaxation with 0.4 to 1.2; effects of the list had 0.2 at most.

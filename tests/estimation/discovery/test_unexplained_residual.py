@@ -19,7 +19,7 @@ from tests.support.robots import example
 
 ROBOT = example("three")
 SWING = {"unlisted_swing": {"mass": 20.0, "length": 2.0}}
-MUCH = ExplainedShares((), (), (), (), left=0.95, size_missed=20.0, size_left=20.0)
+MUCH = ExplainedShares((), (), (), (), left=0.95, size_missed=20.0, size_left=20.0, size_together=0.0)
 
 
 def context() -> IdentificationContext:
