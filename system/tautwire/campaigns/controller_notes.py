@@ -10,7 +10,7 @@ from ..linear import linearise
 from ..robot.robot_file_reader import robot_from_content
 from ..robot.schema import Robot
 from .campaign_plan import PathPlan, Plan
-from .campaign_run import at_path_start, designed_controller, path_trajectory
+from .reference_input import at_path_start, designed_controller, path_trajectory
 
 
 def with_controller_notes(plan: Plan) -> Plan:

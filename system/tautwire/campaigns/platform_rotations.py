@@ -14,8 +14,8 @@ from ..recordings.quaternion_columns import rotation_vectors
 from ..robot.robot_file_reader import robot_from_content
 from ..robot.schema import AXES, Quaternion
 from .campaign_plan import Plan
-from .campaign_run import at_path_start
 from .dataset_schema import ORIENTATION_COLUMNS, RowColumn, series_columns
+from .reference_input import at_path_start
 
 Array = NDArray[np.float64]
 

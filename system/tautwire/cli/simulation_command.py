@@ -172,8 +172,8 @@ def _simulate_closed_loop(
     output: CommandOutput,
 ) -> None:
     """Co-simulate with a controller."""
-    from ..campaigns.campaign_run import at_path_start, path_trajectory
     from ..campaigns.plan_file import read_path_file
+    from ..campaigns.reference_input import at_path_start, path_trajectory
     from ..control import ClosedLoopOptions, cosimulate_closed_loop
     from ..control.controller_file import read_controller
     from ..cosimulation.result_file import open_result_file
