@@ -40,6 +40,7 @@ NATIVE_HELP = (
     'Build FMUs of machine code, which need no Python: by ziglang (pip install "tautwire[native]"), else by the '
     "machine's C compiler."
 )
+CO_SIMULATION_HELP = "Build --native FMUs for co-simulation only, without model exchange, which some tools would prefer."
 PLATFORMS_HELP = "Platforms of --native FMUs: linux64, win64, darwin64, aarch64-linux, aarch64-darwin, or all."
 
 
@@ -50,6 +51,7 @@ def build(
     native: Annotated[bool, typer.Option("--native", help=NATIVE_HELP)] = False,
     platforms: Annotated[str, typer.Option(metavar="LIST", help=PLATFORMS_HELP)] = "",
     fmi: Annotated[int, typer.Option(help="Version of FMI, 2 or 3; the latter for --native FMUs.")] = 2,
+    co_simulation_only: Annotated[bool, typer.Option("--co-simulation-only", help=CO_SIMULATION_HELP)] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -70,13 +72,13 @@ def build(
     refuse_overwriting_inputs(
         [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
     )
-    _refuse_mixed_kinds(for_c_hosts, native, platforms, fmi)
+    _refuse_mixed_kinds(for_c_hosts, native, platforms, fmi, co_simulation_only)
     if for_c_hosts:
         embeddable_python()
         find_compiler()
     targets = [name.strip() for name in platforms.split(",") if name.strip()]
     with atomic_folder(out) as scratch, progress_bar(output) as progress:
-        built = build_fmus(robot, scratch, partial(progress, "building"), native, targets, fmi)
+        built = build_fmus(robot, scratch, partial(progress, "building"), native, targets, fmi, co_simulation_only)
         fmus = with_user_fmus_copied(built, scratch)
         if for_c_hosts:
             project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
@@ -93,11 +95,13 @@ def build(
     output.suggest_next(f"tautwire fmus {shell_quoted(robot_file)}, for their ports; or load {paths[-1]} in your tool")
 
 
-def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str, fmi: int) -> None:
+def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str, fmi: int, co_simulation_only: bool) -> None:
     if native and for_c_hosts:
         raise InputError("--for-c-hosts", "is given beside --native, which any program can run", "leave it out")
     if platforms and not native:
         raise InputError("--platforms", "is given without --native", "add --native")
+    if co_simulation_only and not native:
+        raise InputError("--co-simulation-only", "is given without --native, and others do nothing else", "leave it out")
     if fmi != 2 and not (native and fmi == 3):
         raise InputError("--fmi", f"is {fmi}" + ("" if native else " without --native"), "give 2, or --native --fmi 3")
 

@@ -79,12 +79,13 @@ def build_fmus(
     native: bool = False,
     platforms: Sequence[str] = (),
     fmi: int = 2,
+    co_simulation_only: bool = False,
 ) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
     FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. ``native`` FMUs are machine code for
     ``platforms``, by default this machine's, with their source, and need no Python; they can also be of ``fmi`` 3, the
-    major version. So are those of a robot that asks for ``native_fmus``. User FMUs stay where they are.
+    major version, and are for model exchange too unless they are to be ``co_simulation_only``. So are those of a robot that asks for ``native_fmus``. User FMUs stay where they are.
     The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
     from 0 to 1. Returns the paths of the FMUs.
 
@@ -99,7 +100,7 @@ def build_fmus(
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
     components, paths = _components(robot), dict[str, Path]()
-    with fmu_writer(native or robot.native_fmus, platforms, fmi) as write_fmu:
+    with fmu_writer(native or robot.native_fmus, platforms, fmi, not co_simulation_only) as write_fmu:
         for number, (name, (module, base, data)) in enumerate(components.items(), start=1):
             paths[name] = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
             if progress is not None:
@@ -122,13 +123,17 @@ def _components(robot: Robot) -> dict[str, tuple[str, str, dict[str, Any]]]:
     return cables | {"platform": (*slave, platform_resource(robot))} | winches
 
 
-def fmu_writer(native: bool, platforms: Sequence[str], fmi: int) -> AbstractContextManager[FmuWriter]:
+def fmu_writer(
+    native: bool, platforms: Sequence[str], fmi: int, model_exchange: bool = True
+) -> AbstractContextManager[FmuWriter]:
     """Context with a function that writes FMUs: as machine code, see :func:`native_fmu_writer`, or by pythonfmu."""
-    return nullcontext(native_fmu_writer(platforms, fmi)) if native else pythonfmu_writer()
+    return nullcontext(native_fmu_writer(platforms, fmi, model_exchange)) if native else pythonfmu_writer()
 
 
-def native_fmu_writer(platforms: Sequence[str], fmi: int) -> FmuWriter:
+def native_fmu_writer(platforms: Sequence[str], fmi: int, model_exchange: bool = True) -> FmuWriter:
     """Function that writes native FMUs for some platforms, by default this machine's.
+
+    Without ``model_exchange`` they are for co-simulation only.
 
     Raises NativeBuildError where there is no compiler, or none for these platforms.
     """
@@ -137,7 +142,8 @@ def native_fmu_writer(platforms: Sequence[str], fmi: int) -> FmuWriter:
     from .native.component_sources import COMPONENTS
     from .native.native_archive import native_target, write_native_fmu
 
-    target = native_target([platforms] if isinstance(platforms, str) else platforms, fmi)
+    names = [platforms] if isinstance(platforms, str) else platforms
+    target = native_target(names, fmi, model_exchange)
 
     def write_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
         if module not in COMPONENTS:

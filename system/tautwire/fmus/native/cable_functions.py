@@ -12,14 +12,14 @@ from tautwire_fmu.laws.effects import ActiveEffect, Effect
 from tautwire_fmu.laws.mathematics import Mathematics
 
 from .interpolation_functions import MOTION_SIZE
-from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function
+from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function, trace_kinks
 
 DECLARED_PARAMETERS = 11
 START_SIZE = 7
 
 
 def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
-    """``cable_start``, ``cable_rates``, ``cable_outputs`` and ``cable_derivative`` of a cable's resource.
+    """``cable_start``, ``cable_rates``, ``cable_outputs``, ``cable_derivative`` and ``cable_indicators`` of a resource.
 
     ``start`` are what follows from the parameters: length, direction, sensor delay, whether effects' states
     move, and tension at the load cell behind a filter.
@@ -34,6 +34,7 @@ def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("cable_rates", {"motion": MOTION_SIZE, **known}, cable.rates),
         trace_function("cable_outputs", {"motion": MOTION_SIZE, **known}, cable.outputs),
         trace_derivative("cable_derivative", {"motion": MOTION_SIZE, **known}, cable.outputs, "motion"),
+        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **known}, cable.outputs, ("motion", "states")),
     )
 
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -26,18 +26,21 @@ from .interpolation_functions import (
     quadrature_functions,
     quintic_function,
 )
+from .model_exchange import further_variables
 from .platform_functions import POINT_MASS_PARAMETERS, SENSOR_SIZE, mass_functions
 from .rigid_body_functions import rigid_body_functions, start_size
-from .traced_functions import LARGEST_NUMBER, TracedFunction, c_source
-from .winch_functions import DRIVE_SIZE, winch_functions
+from .traced_functions import INDICATORS, LARGEST_NUMBER, TracedFunction, c_source
+from .winch_functions import DRIVE_SIZE, LIMIT_COUNT, winch_functions
 
 ENTRY_FILE = "all.c"
 CODE_FILE = "code.c"
 START_FILE = "start_values.c"
 STRUCTURE_FILE = "structure.h"
 EQUATIONS_FILE = "equations.c"
+DELAY_FILE = "delayed_signal.c"
 SLAVE_FILES = ("slave.c", "partial_derivatives.c")
 FMI_FILES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
+MODEL_EXCHANGE_FILES = {2: ("model_exchange.c", "fmi2_model_exchange.c")}
 # The input whose rate another input is, by the names without axis.
 RATE_NAMES = {
     "position": "velocity",
@@ -54,40 +57,52 @@ class ComponentSources:
 
     ``code.c`` and what it includes depend on the structure alone: law, effects, formulas and number of cables. All
     other numbers are start values, in ``start_values.c``; ``all.c`` includes both.
+    ``further_variables`` are those that model exchange adds.
     """
 
     files: Mapping[str, str]
+    further_variables: tuple[Variable, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Component:
-    """What a component contributes: C files, macros, and constants beside the variables."""
+    """What a component contributes: C files, macros, and constants beside the variables.
+
+    With a number of event indicators, be it zero, it can do model exchange; None is for co-simulation only.
+    """
 
     c_files: tuple[str, ...]
     macros: Mapping[str, Any]
     constants: Sequence[float] = ()
     state_scales: Sequence[float] = ()
+    indicator_count: int | None = None
 
 
-def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: str, fmi: int) -> ComponentSources:
+def component_sources(
+    kind: str, slave: Slave, data: Mapping[str, Any], guid: str, fmi: int, model_exchange: bool = True
+) -> ComponentSources:
     """C source of a component by its resource ``data``, with the variables of its Python ``slave``.
 
-    ``fmi`` is the major version of FMI.
+    ``fmi`` is the major version of FMI; without ``model_exchange`` the component is for co-simulation only.
     """
     component = COMPONENTS[kind](slave, data)
-    shared = ("numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", *SLAVE_FILES)
-    names = [*shared, *FMI_FILES[fmi], *component.c_files]
+    if not model_exchange or fmi == 3:
+        component = replace(component, indicator_count=None)
+    further = () if component.indicator_count is None else further_variables(slave, component.indicator_count)
+    shared = ("numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", DELAY_FILE, *SLAVE_FILES)
+    names = [*shared, *FMI_FILES[fmi], *component.c_files, *(MODEL_EXCHANGE_FILES[fmi] if further else ())]
     sources = {name: files(__package__).joinpath(f"c/{name}").read_text(encoding="utf-8") for name in names}
-    structure = _structure(slave, component)
+    structure = _structure(slave, component, further)
     return ComponentSources(
         {
             **sources,
             STRUCTURE_FILE: structure,
-            EQUATIONS_FILE: _equations(kind, _equation_structure(data)),
+            EQUATIONS_FILE: c_source(_equations(kind, _equation_structure(data))),
             CODE_FILE: _code(component, fmi),
             START_FILE: _start_values(slave, component, guid),
             ENTRY_FILE: _entry(data["model_name"], fmi),
-        }
+        },
+        further,
     )
 
 
@@ -95,14 +110,15 @@ def _cable(slave: Slave, data: Mapping[str, Any]) -> _Component:
     effects = effects_from_resource(dict(data))
     scales = (LENGTH_SCALE, LENGTH_SCALE, *(state.scale for effect in effects for state in effect.states))
     macros = {"MOTION_SIZE": MOTION_SIZE, "START_SIZE": START_SIZE, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
-    return _Component(("cable.c",), macros, state_scales=scales)
+    return _Component(("cable.c",), macros, state_scales=scales, indicator_count=_indicator_count("cable", data))
 
 
 def _point_mass(slave: Slave, data: Mapping[str, Any]) -> _Component:
     names = [variable.name for variable in slave.variables]
     start_velocity = data.get("start_velocity", (0.0, 0.0, 0.0))
     macros = _platform_macros(slave, data) | {"FIRST_FORCE": names.index("force_1.x")}
-    return _Component(("platform.c", "point_mass.c"), macros, start_velocity)
+    count = _indicator_count("point_mass", data)
+    return _Component(("platform.c", "point_mass.c"), macros, start_velocity, indicator_count=count)
 
 
 def _rigid_body(slave: Slave, data: Mapping[str, Any]) -> _Component:
@@ -118,7 +134,8 @@ def _rigid_body(slave: Slave, data: Mapping[str, Any]) -> _Component:
         "CABLE_COUNT": cable_count,
         "START_SIZE": start_size(cable_count),
     }
-    return _Component(("platform.c", "principal_axes.c", "rigid_body.c"), macros, constants)
+    c_files = ("platform.c", "principal_axes.c", "rigid_body.c")
+    return _Component(c_files, macros, constants, indicator_count=_indicator_count("rigid_body", data))
 
 
 def _platform_macros(slave: Slave, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,7 +157,7 @@ def _platform_macros(slave: Slave, data: Mapping[str, Any]) -> dict[str, Any]:
 
 def _winch(slave: Slave, data: Mapping[str, Any]) -> _Component:
     macros = {"START_SIZE": DRIVE_SIZE, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
-    return _Component(("winch.c",), macros)
+    return _Component(("winch.c",), macros, indicator_count=LIMIT_COUNT)
 
 
 def _controller(slave: Slave, data: Mapping[str, Any]) -> _Component:
@@ -176,9 +193,15 @@ def _equation_structure(data: Mapping[str, Any]) -> str:
     return json.dumps({**structure, "effects": effects, "attachments": attachments}, sort_keys=True)
 
 
+def _indicator_count(kind: str, data: Mapping[str, Any]) -> int:
+    """Number of event indicators of a component, by its traced equations."""
+    functions = _equations(kind, _equation_structure(data))
+    return sum(function.outputs.get(INDICATORS, 0) for function in functions)
+
+
 @cache
-def _equations(kind: str, structure: str) -> str:
-    """C source of the equations of a kind of component; ``structure`` is that part of its resource, as JSON."""
+def _equations(kind: str, structure: str) -> tuple[TracedFunction, ...]:
+    """Traced equations of a kind of component; ``structure`` is that part of its resource, as JSON."""
     data = json.loads(structure)
     functions: tuple[TracedFunction, ...]
     if kind == "cable":
@@ -189,13 +212,13 @@ def _equations(kind: str, structure: str) -> str:
         functions = (*rigid_body_functions(data), *quadrature_functions(), quintic_function())
     else:
         functions = winch_functions() if kind == "winch" else ()
-    return c_source((*functions, cubic_function()))
+    return (*functions, cubic_function())
 
 
-def _structure(slave: Slave, component: _Component) -> str:
+def _structure(slave: Slave, component: _Component, further: Sequence[Variable]) -> str:
     """Counts and tables of the variables, and the tableau of the adaptive integration."""
     variables, parameters = slave.variables, slave.variables[slave.first_parameter :]
-    names = [variable.name for variable in variables]
+    names = [variable.name for variable in (*variables, *further)]
     macros: dict[str, Any] = {
         "VARIABLE_COUNT": len(variables),
         "INPUT_COUNT": slave.input_count,
@@ -205,6 +228,8 @@ def _structure(slave: Slave, component: _Component) -> str:
         **component.macros,
         **{name: repr(getattr(integration, name)) for name in INTEGRATION_CONSTANTS},
     }
+    if component.indicator_count is not None:
+        macros |= {"MODEL_EXCHANGE": 1, "INDICATOR_COUNT": component.indicator_count}
     if MIDDLE_TIME.name in names:
         macros["MIDDLE_TIME"] = names.index(MIDDLE_TIME.name)
     digest = hashlib.sha256(json.dumps([names, macros], sort_keys=True).encode()).hexdigest()[:16]
@@ -220,6 +245,7 @@ def _structure(slave: Slave, component: _Component) -> str:
             _numbers("minima", [_bound(each.minimum, -LARGEST_NUMBER) for each in parameters]),
             _numbers("maxima", [_bound(each.maximum, LARGEST_NUMBER) for each in parameters]),
             _numbers("state_scales", component.state_scales or unused_scale),
+            _numbers("state_nominals", [each.nominal or 1.0 for each in variables[slave.states]]),
             _numbers("stage_times", integration.STAGE_TIMES),
             _numbers("solution_weights", integration.SOLUTION_WEIGHTS),
             _numbers("error_weights", integration.ERROR_WEIGHTS),
@@ -261,8 +287,9 @@ def _bound(value: float | None, absent: float) -> float:
 
 def _code(component: _Component, fmi: int) -> str:
     """The translation unit of everything but the start values."""
-    common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h")
-    names = (*common, *component.c_files, *SLAVE_FILES, f"fmi{fmi}.c")
+    common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h", DELAY_FILE)
+    inside, behind = ((), ()) if component.indicator_count is None else ((each,) for each in MODEL_EXCHANGE_FILES[fmi])
+    names = (*common, *component.c_files, *SLAVE_FILES, *inside, f"fmi{fmi}.c", *behind)
     declarations = (
         "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n"
         "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif\n"

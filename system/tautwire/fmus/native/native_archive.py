@@ -16,6 +16,7 @@ from uuid import NAMESPACE_URL, uuid5
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from tautwire_fmu import slaves
+from tautwire_fmu.model_description import Variable
 from tautwire_fmu.slave import Slave
 
 from ... import __version__
@@ -25,6 +26,7 @@ from ..fmu_documentation import documentation_files
 from .c_toolchain import PLATFORMS, TargetPlatform, Toolchain, compile_library, find_toolchain, target_platforms
 from .component_sources import ENTRY_FILE, component_sources, rate_references
 from .fmi3_description import build_description, fmi3_description
+from .model_exchange import add_model_exchange
 from .universal_binary import ARM_64, X86_64, universal_binary
 
 FMI_VERSIONS = (2, 3)
@@ -37,11 +39,15 @@ ENTRY_MODE = 0o100644
 
 @dataclass(frozen=True)
 class NativeTarget:
-    """What native FMUs are built for: platforms, the compiler, and the major version of FMI."""
+    """What native FMUs are built for: platforms, the compiler, the major version of FMI, and its interfaces.
+
+    Co-simulation is always one; ``model_exchange`` is the other, of components that can do it.
+    """
 
     platforms: tuple[TargetPlatform, ...]
     toolchain: Toolchain
     fmi: int = 2
+    model_exchange: bool = True
 
     def library(self, platform: TargetPlatform, name: str) -> str:
         """Path of a library in the archive."""
@@ -49,12 +55,12 @@ class NativeTarget:
         return f"binaries/{folder}/{name}{platform.suffix}"
 
 
-def native_target(platforms: Sequence[str] = (), fmi: int = 2) -> NativeTarget:
+def native_target(platforms: Sequence[str] = (), fmi: int = 2, model_exchange: bool = True) -> NativeTarget:
     """Target by the names of platforms, see :func:`tautwire.fmus.native.c_toolchain.target_platforms`."""
     if fmi not in FMI_VERSIONS:
         raise ArgumentError("build_fmus: fmi", fmi, f"is {fmi!r}", f"give one of {FMI_VERSIONS}")
     toolchain = find_toolchain()
-    return NativeTarget(target_platforms(platforms, toolchain), toolchain, fmi)
+    return NativeTarget(target_platforms(platforms, toolchain), toolchain, fmi, model_exchange)
 
 
 def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: NativeTarget, path: Path) -> None:
@@ -64,16 +70,18 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     """
     unidentified = dict(data) | {"guid": "", "version": __version__}
     slave = python_slave(kind, base, unidentified)
-    anonymous = component_sources(kind, slave, unidentified, "", target.fmi).files
+    interfaces = (target.fmi, target.model_exchange)
+    anonymous = component_sources(kind, slave, unidentified, "", *interfaces).files
     slave.guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
-    sources = component_sources(kind, slave, unidentified, slave.guid, target.fmi).files
+    component = component_sources(kind, slave, unidentified, slave.guid, *interfaces)
+    sources = component.files
     name = unidentified["model_name"]
     compile_for = partial(_compiled, sources, target)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         compiled = list(threads.map(compile_for, target.platforms))
     libraries = dict(zip((target.library(platform, name) for platform in target.platforms), compiled, strict=True))
     contents = {
-        DESCRIPTION_FILE: _xml(native_description(slave, target.fmi)),
+        DESCRIPTION_FILE: _xml(native_description(slave, target.fmi, component.further_variables)),
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
         **libraries,
     }
@@ -106,8 +114,11 @@ def python_slave(kind: str, base: str, data: Mapping[str, Any]) -> Slave:
     return slave
 
 
-def native_description(slave: Slave, fmi: int) -> Element:
-    """Model description of the Python slave, with what its native twin can do and its sources."""
+def native_description(slave: Slave, fmi: int, further: Sequence[Variable] = ()) -> Element:
+    """Model description of the Python slave, with what its native twin can do and its sources.
+
+    ``further`` are the variables that model exchange adds, none where there is none.
+    """
     root = slave.to_xml()
     cosimulation = root.find("CoSimulation")
     assert cosimulation is not None
@@ -126,6 +137,8 @@ def native_description(slave: Slave, fmi: int) -> Element:
         cosimulation.set(name, value)
     source_files = SubElement(cosimulation, "SourceFiles")
     SubElement(source_files, "File", {"name": ENTRY_FILE})
+    if further:
+        add_model_exchange(root, slave, further, ENTRY_FILE)
     if "generationDateAndTime" in root.attrib:
         del root.attrib["generationDateAndTime"]
     return root if fmi == 2 else fmi3_description(root)

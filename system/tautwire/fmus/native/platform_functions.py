@@ -12,14 +12,14 @@ from tautwire_fmu.laws.effects import Effect
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add
 
-from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function
+from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function, trace_kinks
 
 POINT_MASS_PARAMETERS = 5
 SENSOR_SIZE = 5
 
 
 def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tuple[TracedFunction, ...]:
-    """``platform_sensor``, ``platform_node`` and ``platform_derivative`` of a platform's resource.
+    """``platform_sensor``, ``platform_node``, ``platform_derivative`` and ``platform_indicators`` of a resource.
 
     ``first_effect_parameter`` parameters come before those of the effects, mass and gravity first. ``sensor`` is gain,
     offset and delay of the measured position; a node the acceleration of the mass and its rate; the derivative that of
@@ -33,6 +33,7 @@ def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tupl
         trace_function("platform_sensor", {"parameters": parameters}, mass.sensor),
         trace_function("platform_node", known, mass.node),
         trace_derivative("platform_derivative", known, mass.acceleration, "force_and_rate"),
+        trace_kinks("platform_indicators", known, mass.acceleration, ("mass", "force_and_rate", "time")),
     )
 
 

@@ -73,6 +73,7 @@ def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("body_attitude", {**turning, **load, **sizes}, body.attitude),
         trace_function("body_moment", {**attitude, **load, **sizes}, body.moment),
         trace_function("body_points", points, body.points),
+        trace_function("quaternion_rate", {"quaternion": 4, **attitude}, _quaternion_rate),
         trace_derivative("body_derivative", {**turning, "action": ACTION_SIZE, **sizes}, body.reaction, "action"),
         *_step_functions(body, "two_node", 1, sizes),
         *_step_functions(body, "three_node", 2, sizes),
@@ -270,6 +271,12 @@ class _Body:
 
 def _weights(later_nodes: int) -> tuple[Any, Any]:
     return (QUINTIC_MIDDLE, QUINTIC_END) if later_nodes == 2 else (CUBIC_MIDDLE, CUBIC_END)
+
+
+def _quaternion_rate(m: Mathematics, columns: Columns) -> Columns:
+    """Rate of the quaternion: half its product with the angular velocity in the platform's axes."""
+    _, velocity, _ = _split_attitude(columns["attitude"])
+    return {"rate": multiply(columns["quaternion"], (0.0, *scale(0.5, velocity)))}
 
 
 def _quaternions(m: Mathematics, start: Quaternion, angles: Sequence[Any]) -> tuple[Quaternion, Quaternion]:

@@ -20,6 +20,7 @@ LARGEST_NUMBER = 1.7976931348623157e308
 # Above it the exponential function overflows.
 LARGEST_EXPONENT = 709.782712893384
 VALID = "valid"
+INDICATORS = "indicators"
 CASADI_TYPES = "#define casadi_real double\n#define casadi_int int"
 
 Columns = Mapping[str, Sequence[Any]]
@@ -90,10 +91,14 @@ class TracedFunction:
 
 def trace_function(name: str, inputs: Mapping[str, int], equations: Equations) -> TracedFunction:
     """Trace ``equations``: from mathematics and the columns of its inputs to the columns of its outputs."""
+    return _traced(name, inputs, lambda recorder, columns: equations(recorder.mathematics(), columns))
+
+
+def _traced(name: str, inputs: Mapping[str, int], equations: Callable[[Recorder, Columns], Columns]) -> TracedFunction:
     recorder = Recorder()
     symbols = {each: SX.sym(each, size) for each, size in inputs.items()}
     columns = {each: casadi.vertsplit(symbol) if symbol.numel() else [] for each, symbol in symbols.items()}
-    outputs = {each: column(values) for each, values in equations(recorder.mathematics(), columns).items()}
+    outputs = {each: column(values) for each, values in equations(recorder, columns).items()}
     valid = SX(1.0)
     for condition in recorder.conditions:
         valid = casadi.logic_and(valid, condition)
@@ -137,6 +142,24 @@ def trace_derivative(name: str, inputs: Mapping[str, int], equations: Equations,
         return {each: rates_along(values, columns[varying], columns["seed"]) for each, values in outputs.items()}
 
     return trace_function(name, {**inputs, "seed": inputs[varying]}, derivative)
+
+
+def trace_kinks(
+    name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]
+) -> TracedFunction:
+    """Trace the ``indicators`` of ``equations``: numbers at whose zeros some output has a kink.
+
+    They are the arguments of absolute values, maxima and branches, each once, that change with the columns ``varying``.
+    """
+
+    def indicators(recorder: Recorder, columns: Columns) -> Columns:
+        equations(recorder.mathematics(), columns)
+        variables = column([entry for each in varying for entry in columns[each]])
+        switches = casadi.vertsplit(casadi.cse(column(recorder.switches))) if recorder.switches else []
+        distinct = {each.element_hash(): each for each in switches if casadi.depends_on(each, variables)}
+        return {INDICATORS: list(distinct.values())}
+
+    return _traced(name, inputs, indicators)
 
 
 def c_source(functions: Sequence[TracedFunction]) -> str:

@@ -11,6 +11,8 @@ from .traced_functions import Columns, TracedFunction, trace_derivative, trace_f
 
 PARAMETERS = 6
 DRIVE_SIZE = 6
+# Distances to limits, at whose zeros events are.
+LIMIT_COUNT = 3
 DRIVE_CONSTANTS = len(law.DriveConstants._fields)
 
 

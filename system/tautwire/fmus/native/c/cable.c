@@ -123,16 +123,22 @@ static int advance(Slave *slave, double step, int at_end) {
   return 1;
 }
 
+static void tension_instant(const Slave *slave, double tension, double rate, double *instant) {
+  instant[0] = slave->state.time;
+  instant[1] = tension;
+  instant[2] = rate;
+}
+
 static int refresh(Slave *slave) {
-  double *real = slave->state.real, motion[MOTION_SIZE], delayed[1][2];
+  double *real = slave->state.real, motion[MOTION_SIZE], delayed[1][2], instant[INSTANT_SIZE];
   if (!extrapolated_motion(real + POSITION, &slave->state.elapsed, motion)) return 0;
   if (!shown_at(slave, motion, real + FIRST_STATE, real + FIRST_OUTPUT, real + FIRST_RATE)) return 0;
   if (!slave->state.started) {
     memcpy(real + MIDDLE_FORCE, real + FIRST_OUTPUT, 3 * sizeof(double));
     memcpy(real + MIDDLE_FORCE + 3, real + FIRST_RATE, 3 * sizeof(double));
   }
-  if (slave->start[TENSION_DELAY] > 0.0 && slave->delay_line.count) {
-    delayed_values(&slave->delay_line, slave->start[TENSION_DELAY], delayed);
+  tension_instant(slave, real[TENSION], real[TENSION_RATE], instant);
+  if (shown_late(slave, instant, slave->start[TENSION_DELAY], delayed)) {
     real[TENSION] = delayed[0][0];
     real[TENSION_RATE] = delayed[0][1];
   }
@@ -153,3 +159,28 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
   if (slave->start[TENSION_DELAY] > 0.0 && slave->delay_line.count) change[TENSION] = change[TENSION_RATE] = 0.0;
   return 1;
 }
+
+#ifdef MODEL_EXCHANGE
+static int rates_now(const Slave *slave, double *rates) {
+  const double *real = slave->state.real;
+  double motion[MOTION_SIZE];
+  return extrapolated_motion(real + POSITION, &slave->state.elapsed, motion) &&
+         cable_rates(motion, real + FIRST_STATE, parameters_of(slave), slave->start, rates);
+}
+
+static int indicators_now(const Slave *slave, double *indicators) {
+  const double *real = slave->state.real;
+  double motion[MOTION_SIZE];
+  return extrapolated_motion(real + POSITION, &slave->state.elapsed, motion) &&
+         cable_indicators(motion, real + FIRST_STATE, parameters_of(slave), slave->start, indicators);
+}
+
+static int record_now(Slave *slave) {
+  double motion[MOTION_SIZE], shown[8], rates[4], instant[INSTANT_SIZE], *real = slave->state.real;
+  if (!(slave->start[TENSION_DELAY] > 0.0)) return 1;
+  if (!extrapolated_motion(real + POSITION, &slave->state.elapsed, motion)) return 0;
+  if (!shown_at(slave, motion, real + FIRST_STATE, shown, rates)) return 0;
+  tension_instant(slave, shown[SHOWN_TENSION], rates[SHOWN_TENSION_RATE], instant);
+  return record_instant(slave, instant, slave->start[TENSION_DELAY]);
+}
+#endif

@@ -1,8 +1,10 @@
 /* Delay line of a sensor: segments of a signal between communication points, as far back as the sensor lags.
 
-   A segment is its start and end time, then value and derivatives of each axis at the start, then those at the end. */
+   A segment is its start and end time, then value and derivatives of each axis at the start, then those at the end; an
+   instant is its time, then these. */
 
 #define SEGMENT_SIZE (2 + 2 * SIGNAL_AXES * SIGNAL_DERIVATIVES)
+#define INSTANT_SIZE (1 + SIGNAL_AXES * SIGNAL_DERIVATIVES)
 
 typedef struct {
   size_t count, capacity;

@@ -1,4 +1,4 @@
-/* FMI 2.0 co-simulation functions. */
+/* FMI 2.0 functions, but those of model exchange. */
 
 #include "fmi2Functions.h"
 
@@ -33,6 +33,13 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, co
   return fmi2OK;
 }
 
+static int is_provided(fmi2Type type) {
+#ifdef MODEL_EXCHANGE
+  if (type == fmi2ModelExchange) return 1;
+#endif
+  return type == fmi2CoSimulation;
+}
+
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging_on) {
   size_t length = name ? strlen(name) : 0;
@@ -46,8 +53,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
   instance->logging_on = logging_on;
   instance->slave.log = log_to_importer;
   instance->slave.owner = instance;
-  if (type != fmi2CoSimulation || !guid || strcmp(guid, model_guid)) {
-    refuse(instance, type != fmi2CoSimulation ? "this FMU is for co-simulation only" : "the GUID is not that of this FMU");
+  instance->slave.is_model_exchange = type == fmi2ModelExchange;
+  if (!is_provided(type) || !guid || strcmp(guid, model_guid)) {
+    refuse(instance, is_provided(type) ? "the GUID is not that of this FMU" : "this FMU is for co-simulation only");
     free(instance);
     return NULL;
   }
@@ -82,13 +90,12 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
   Slave *slave = &((Instance *)c)->slave;
   if (!is_allowed(slave, INITIALIZATION, "fmi2ExitInitializationMode") || check_inputs(slave) != STATUS_OK)
     return fmi2Error;
-  slave->phase = STEPPING;
-  return fmi2OK;
+  return (fmi2Status)leave_initialization(slave);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
   Slave *slave = &((Instance *)c)->slave;
-  if (!is_allowed(slave, STEPPING, "fmi2Terminate")) return fmi2Error;
+  if (!is_running(slave) && !is_allowed(slave, STEPPING, "fmi2Terminate")) return fmi2Error;
   slave->phase = TERMINATED;
   return fmi2OK;
 }

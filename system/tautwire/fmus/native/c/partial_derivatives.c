@@ -2,7 +2,7 @@
 
 static int refuse_derivative(const Slave *slave, unsigned int reference, const char *wanted) {
   char message[300];
-  if (reference >= VARIABLE_COUNT) return are_known(slave, &reference, 1), STATUS_ERROR;
+  if (reference >= REFERENCE_COUNT) return are_known(slave, &reference, 1), STATUS_ERROR;
   snprintf(message, sizeof message, "%s is no %s: derivatives are those of outputs with respect to inputs",
            variable_names[reference], wanted);
   log_message(slave, STATUS_ERROR, message);

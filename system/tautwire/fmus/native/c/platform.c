@@ -130,6 +130,14 @@ static int present_acceleration(const Slave *slave, const double *mass, double *
   return 1;
 }
 
+#ifdef MODEL_EXCHANGE
+static int present_kinks(const Slave *slave, const double *mass, double *indicators) {
+  double now[6], time = platform_time(slave);
+  present_force(slave, now);
+  return platform_indicators(mass, now, &time, parameters_of(slave), indicators);
+}
+#endif
+
 /* Change of that acceleration along a change of the inputs. */
 static int differentiate_acceleration(const Slave *slave, const double *mass, const double *seed, double *change) {
   double now[6], force_seed[6], time = platform_time(slave);
@@ -153,16 +161,34 @@ static int record_path(Slave *slave, double step, const double *first, const dou
   return append_segment(&slave->delay_line, segment, slave->start[POSITION_DELAY]);
 }
 
-/* Sets the measured position, which sensors make differ from the true one. */
-static void refresh_measured_position(Slave *slave, const double *position) {
-#ifdef MEASURED_POSITION
-  double delayed[3][2], *real = slave->state.real;
-  int has_delay = slave->start[POSITION_DELAY] > 0.0 && slave->delay_line.count, axis;
-  if (has_delay) delayed_values(&slave->delay_line, slave->start[POSITION_DELAY], delayed);
+/* A motion is position, velocity and acceleration. */
+static void motion_instant(const Slave *slave, const double *motion, double *instant) {
+  int axis, k;
+  instant[0] = slave->state.time;
   for (axis = 0; axis < 3; axis++)
-    real[MEASURED_POSITION + axis] = slave->start[POSITION_GAIN] * (has_delay ? delayed[axis][0] : position[axis]) +
+    for (k = 0; k < 3; k++) instant[1 + 3 * axis + k] = motion[3 * k + axis];
+}
+
+#ifdef MODEL_EXCHANGE
+static int record_motion(Slave *slave, const double *motion) {
+  double instant[INSTANT_SIZE];
+  if (!(slave->start[POSITION_DELAY] > 0.0)) return 1;
+  motion_instant(slave, motion, instant);
+  return record_instant(slave, instant, slave->start[POSITION_DELAY]);
+}
+#endif
+
+/* Sets the measured position, which sensors make differ from the true one, by the motion of now. */
+static void refresh_measured_position(Slave *slave, const double *motion) {
+#ifdef MEASURED_POSITION
+  double delayed[3][2], instant[INSTANT_SIZE], *real = slave->state.real;
+  int is_late, axis;
+  motion_instant(slave, motion, instant);
+  is_late = shown_late(slave, instant, slave->start[POSITION_DELAY], delayed);
+  for (axis = 0; axis < 3; axis++)
+    real[MEASURED_POSITION + axis] = slave->start[POSITION_GAIN] * (is_late ? delayed[axis][0] : motion[axis]) +
                                      slave->start[POSITION_OFFSET + axis];
 #else
-  (void)slave, (void)position;
+  (void)slave, (void)motion;
 #endif
 }

@@ -35,3 +35,21 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
   if (middle_is_now(slave)) memcpy(change + MIDDLE_MOTION, change + FIRST_STATE, 9 * sizeof(double));
   return 1;
 }
+
+#ifdef MODEL_EXCHANGE
+static int rates_now(const Slave *slave, double *rates) {
+  const double *mass = slave->state.real + FIRST_STATE;
+  memcpy(rates, mass + 3, 3 * sizeof(double));
+  return present_acceleration(slave, mass, rates + 3);
+}
+
+static int indicators_now(const Slave *slave, double *indicators) {
+  return present_kinks(slave, slave->state.real + FIRST_STATE, indicators);
+}
+
+static int record_now(Slave *slave) {
+  double motion[9];
+  memcpy(motion, slave->state.real + FIRST_STATE, MASS_SIZE * sizeof(double));
+  return present_acceleration(slave, motion, motion + 6) && record_motion(slave, motion);
+}
+#endif

@@ -145,12 +145,29 @@ static int advance(Slave *slave, double step, int at_end) {
   return 1;
 }
 
-static int refresh(Slave *slave) {
-  double *real = slave->state.real, load[LOAD_SIZE], now[LOAD_SIZE], attitude[ATTITUDE_SIZE], mass[9];
+/* The quaternion with length one, which the integrator of an importer in model exchange does not keep exactly. */
+static void present_quaternion(const Slave *slave, double *quaternion) {
+  double squared = 0.0;
+  int k;
+  memcpy(quaternion, slave->state.real + FIRST_STATE, 4 * sizeof(double));
+  if (!slave->is_model_exchange) return;
+  for (k = 0; k < 4; k++) squared += quaternion[k] * quaternion[k];
+  for (k = 0; k < 4; k++) quaternion[k] /= sqrt(squared);
+}
+
+/* Load and attitude at the present instant. */
+static int present_attitude(const Slave *slave, double *now, double *attitude) {
+  const double *real = slave->state.real;
+  double load[LOAD_SIZE], quaternion[4];
   load_of(slave, real, load);
   extrapolate_load(load, slave->state.elapsed, now);
-  if (!body_attitude(real + FIRST_STATE, real + MOMENTUM_STATE, now, parameters_of(slave), slave->start, attitude))
-    return 0;
+  present_quaternion(slave, quaternion);
+  return body_attitude(quaternion, real + MOMENTUM_STATE, now, parameters_of(slave), slave->start, attitude);
+}
+
+static int refresh(Slave *slave) {
+  double *real = slave->state.real, now[LOAD_SIZE], attitude[ATTITUDE_SIZE], mass[9];
+  if (!present_attitude(slave, now, attitude)) return 0;
   memcpy(mass, real + MASS_STATE, MASS_SIZE * sizeof(double));
   if (!present_acceleration(slave, mass, mass + 6)) return 0;
   if (!body_points(attitude, mass, slave->start, real + FIRST_OUTPUT)) return 0;
@@ -163,15 +180,40 @@ static int refresh(Slave *slave) {
 /* An action is a load, then the acceleration of the mass, in which the motion of all points is linear. */
 static int differentiate(const Slave *slave, const double *seed, double *change) {
   const double *real = slave->state.real;
-  double load[LOAD_SIZE], action[LOAD_SIZE + 3] = {0.0}, action_seed[LOAD_SIZE + 3];
+  double load[LOAD_SIZE], action[LOAD_SIZE + 3] = {0.0}, action_seed[LOAD_SIZE + 3], quaternion[4];
   load_of(slave, real, load);
   extrapolate_load(load, slave->state.elapsed, action);
   load_of(slave, seed, action_seed);
   if (!differentiate_acceleration(slave, real + MASS_STATE, seed, action_seed + LOAD_SIZE)) return 0;
-  if (!body_derivative(real + FIRST_STATE, real + MOMENTUM_STATE, action, parameters_of(slave), slave->start,
+  present_quaternion(slave, quaternion);
+  if (!body_derivative(quaternion, real + MOMENTUM_STATE, action, parameters_of(slave), slave->start,
                        action_seed, change + FIRST_OUTPUT))
     return 0;
   if (middle_is_now(slave))
     memcpy(change + MIDDLE_OUTPUT, change + FIRST_ATTACHMENT_OUTPUT, POINT_SIZE * CABLE_COUNT * sizeof(double));
   return 1;
 }
+
+#ifdef MODEL_EXCHANGE
+static int rates_now(const Slave *slave, double *rates) {
+  const double *real = slave->state.real;
+  double now[LOAD_SIZE], attitude[ATTITUDE_SIZE], moment[6];
+  if (!present_attitude(slave, now, attitude)) return 0;
+  if (!body_moment(attitude, now, parameters_of(slave), slave->start, moment)) return 0;
+  memcpy(rates + 4, real + MASS_STATE + 3, 3 * sizeof(double));
+  memcpy(rates + 10, moment, 3 * sizeof(double));
+  return quaternion_rate(real + FIRST_STATE, attitude, rates) &&
+         present_acceleration(slave, real + MASS_STATE, rates + 7);
+}
+
+static int indicators_now(const Slave *slave, double *indicators) {
+  return present_kinks(slave, slave->state.real + MASS_STATE, indicators);
+}
+
+static int record_now(Slave *slave) {
+  double now[LOAD_SIZE], attitude[ATTITUDE_SIZE], mass[9], points[POINTS_SIZE];
+  memcpy(mass, slave->state.real + MASS_STATE, MASS_SIZE * sizeof(double));
+  return present_attitude(slave, now, attitude) && present_acceleration(slave, mass, mass + 6) &&
+         body_points(attitude, mass, slave->start, points) && record_motion(slave, points);
+}
+#endif

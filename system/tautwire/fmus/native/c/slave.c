@@ -44,13 +44,19 @@ static void reset_slave(Slave *slave) {
 }
 
 static int is_allowed(const Slave *slave, Phase phase, const char *call) {
-  static const char *const names[] = {"instantiated", "initialization", "stepping", "terminated"};
+  static const char *const names[] = {"instantiated", "initialization", "stepping",
+                                      "terminated",   "events",         "continuous time"};
   char message[200];
   if (slave->phase == phase) return 1;
   snprintf(message, sizeof message, "%s in the state %s: allowed in the state %s only", call, names[slave->phase],
            names[phase]);
   log_message(slave, STATUS_ERROR, message);
   return 0;
+}
+
+/* Whether initialization is over and the end has not come, in either interface. */
+static int is_running(const Slave *slave) {
+  return slave->phase == STEPPING || slave->phase == EVENTS || slave->phase == CONTINUOUS_TIME;
 }
 
 static void set_tolerance(Slave *slave, double tolerance) {
@@ -61,7 +67,7 @@ static int are_known(const Slave *slave, const unsigned int *references, size_t 
   char message[100];
   size_t k;
   for (k = 0; k < count; k++)
-    if (references[k] >= VARIABLE_COUNT) {
+    if (references[k] >= REFERENCE_COUNT) {
       snprintf(message, sizeof message, "no real variable has the value reference %u", references[k]);
       log_message(slave, STATUS_ERROR, message);
       return 0;
@@ -79,13 +85,13 @@ static int is_within_bounds(const Slave *slave, unsigned int reference, double v
   return 0;
 }
 
-/* Outputs and local variables lie between inputs and parameters. */
+/* Outputs and local variables lie between inputs and parameters, rates and event indicators behind these. */
 static int are_settable(const Slave *slave, const unsigned int *references, size_t count) {
   char message[300];
   size_t k;
   if (!are_known(slave, references, count)) return 0;
   for (k = 0; k < count; k++)
-    if (references[k] >= INPUT_COUNT && references[k] < FIRST_PARAMETER) {
+    if ((references[k] >= INPUT_COUNT && references[k] < FIRST_PARAMETER) || references[k] >= VARIABLE_COUNT) {
       snprintf(message, sizeof message, "%s is no input and no parameter: it is computed, and cannot be set",
                variable_names[references[k]]);
       log_message(slave, STATUS_ERROR, message);
@@ -135,11 +141,25 @@ static void refresh_outputs(Slave *slave) {
   log_with_inputs(slave, STATUS_WARNING, "no outputs: the law has no value");
 }
 
+/* Gets variables of which some are rates or event indicators. */
+static void get_further_variables(const Slave *slave, const unsigned int *references, size_t count, double *values) {
+#ifdef MODEL_EXCHANGE
+  double further[FURTHER_COUNT];
+  size_t k;
+  further_values(slave, further);
+  for (k = 0; k < count; k++)
+    values[k] = references[k] < VARIABLE_COUNT ? slave->state.real[references[k]] : further[references[k] - VARIABLE_COUNT];
+#else
+  (void)slave, (void)references, (void)count, (void)values;
+#endif
+}
+
 static int get_variables(Slave *slave, const unsigned int *references, size_t count, double *values) {
   size_t k;
   refresh_outputs(slave);
   if (!are_known(slave, references, count)) return STATUS_ERROR;
-  for (k = 0; k < count; k++) values[k] = slave->state.real[references[k]];
+  for (k = 0; k < count && references[k] < VARIABLE_COUNT; k++) values[k] = slave->state.real[references[k]];
+  if (k < count) get_further_variables(slave, references, count, values);
   return STATUS_OK;
 }
 
@@ -151,6 +171,17 @@ static int check_inputs(const Slave *slave) {
   if (are_finite(slave->state.real, INPUT_COUNT)) return STATUS_OK;
   log_with_inputs(slave, STATUS_ERROR, "inputs have to be finite");
   return STATUS_ERROR;
+}
+
+/* Ends initialization; outputs of the middle of a step, which model exchange has not, then keep their values. */
+static int leave_initialization(Slave *slave) {
+  slave->phase = STEPPING;
+  if (!slave->is_model_exchange) return STATUS_OK;
+  refresh_outputs(slave);
+  slave->state.started = 1;
+  slave->state.start_time = slave->state.time;
+  slave->phase = EVENTS;
+  return STATUS_OK;
 }
 
 static int middle_inputs_hold(const State *state, double time, double step) {

@@ -5,12 +5,15 @@ typedef struct {
   double previous_inputs[INPUT_COUNT];
   double elapsed;
   double time;
+  double start_time;
+  double last_instant[INSTANT_SIZE];
+  int32_t has_instant;
   int32_t has_previous_inputs;
   int32_t started;
 } State;
 
-/* The states of FMI's co-simulation that tell which calls are allowed. */
-typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED } Phase;
+/* The states of FMI that tell which calls are allowed; events and continuous time are those of model exchange. */
+typedef enum { INSTANTIATED, INITIALIZATION, STEPPING, TERMINATED, EVENTS, CONTINUOUS_TIME } Phase;
 
 typedef void (*Log)(void *owner, int status, const char *message);
 
@@ -23,6 +26,7 @@ typedef struct {
   int parameters_valid;
   int outputs_stale;
   int has_middle_inputs;
+  int is_model_exchange;
   Log log;
   void *owner;
 } Slave;
@@ -35,6 +39,19 @@ static int derive_start(Slave *slave, double *start_states);
 static int advance(Slave *slave, double step, int at_end);
 static int refresh(Slave *slave);
 static int differentiate(const Slave *slave, const double *seed, double *change);
+
+/* In model exchange components have these too. The last one records what a sensor shows late, where there is one.
+   Rates of the states and event indicators have the references behind those of the state's variables. */
+#ifdef MODEL_EXCHANGE
+#define FURTHER_COUNT (STATE_COUNT + INDICATOR_COUNT)
+static int rates_now(const Slave *slave, double *rates);
+static int indicators_now(const Slave *slave, double *indicators);
+static int record_now(Slave *slave);
+static void further_values(const Slave *slave, double *values);
+#else
+#define FURTHER_COUNT 0
+#endif
+#define REFERENCE_COUNT (VARIABLE_COUNT + FURTHER_COUNT)
 
 /* Whether outputs of the middle of a step are those of now. By the model structure they depend on inputs in this mode
    alone, and importers compress Jacobians by it. */

@@ -130,3 +130,22 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
   double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1];
   return winch_derivative(real + FIRST_STATE, &command, slave->start, seed + COMMAND, change + FIRST_OUTPUT + 1);
 }
+
+#ifdef MODEL_EXCHANGE
+static int rates_now(const Slave *slave, double *rates) {
+  const double *real = slave->state.real;
+  double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1];
+  return winch_rates(real + FIRST_STATE, &command, slave->start, rates);
+}
+
+static int indicators_now(const Slave *slave, double *indicators) {
+  const double *real = slave->state.real;
+  double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1];
+  return winch_margins(real + FIRST_STATE, &command, slave->start, indicators);
+}
+
+static int record_now(Slave *slave) {
+  (void)slave;
+  return 1;
+}
+#endif
