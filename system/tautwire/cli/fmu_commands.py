@@ -40,7 +40,9 @@ NATIVE_HELP = (
     'Build FMUs of machine code, which need no Python: by ziglang (pip install "tautwire[native]"), else by the '
     "machine's C compiler."
 )
-CO_SIMULATION_HELP = "Build --native FMUs for co-simulation only, without model exchange, which some tools would prefer."
+CO_SIMULATION_HELP = (
+    "Build --native FMUs for co-simulation only, without model exchange, which some tools would prefer."
+)
 PLATFORMS_HELP = "Platforms of --native FMUs: linux64, win64, darwin64, aarch64-linux, aarch64-darwin, or all."
 
 
@@ -101,7 +103,9 @@ def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str, fmi: in
     if platforms and not native:
         raise InputError("--platforms", "is given without --native", "add --native")
     if co_simulation_only and not native:
-        raise InputError("--co-simulation-only", "is given without --native, and others do nothing else", "leave it out")
+        raise InputError(
+            "--co-simulation-only", "is given without --native, and others do nothing else", "leave it out"
+        )
     if fmi != 2 and not (native and fmi == 3):
         raise InputError("--fmi", f"is {fmi}" + ("" if native else " without --native"), "give 2, or --native --fmi 3")
 

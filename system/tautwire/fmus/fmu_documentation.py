@@ -12,7 +12,7 @@ from textwrap import dedent
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from fmpy.model_description import ModelDescription
+from fmpy.model_description import ModelDescription, ScalarVariable
 
 from tautwire_fmu.laws import cable, point_mass, rigid_body, sampled_control, winch_drive
 from tautwire_fmu.laws.effects import BY_NAME
@@ -27,7 +27,15 @@ LAWS: Mapping[str, ModuleType] = {
     "winch": winch_drive,
     "controller": sampled_control,
 }
-TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
+# What model exchange adds.
+FURTHER = "further"
+TABLES = {
+    "Inputs": "input",
+    "Outputs": "output",
+    "Parameters": "parameter",
+    "States": "local",
+    "Derivatives of the states, and event indicators": FURTHER,
+}
 # What travels inside an FMU of Python.
 LICENSED_PACKAGES = ("tautwire", "pythonfmu")
 ICON_PATHS = {"2.0": "model.png", "3.0": "terminalsAndIcons/icon.png"}
@@ -64,11 +72,19 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
         law_blocks=_text_blocks(LAWS[kind].__doc__ or ""),
         effects=[BY_NAME[setting["name"]] for setting in data.get("effects", ())],
         formulas=data.get("formulas") or {},
+        has_model_exchange=description.modelExchange is not None,
         tables={
-            title: [variable for variable in variables if variable.causality == causality]
-            for title, causality in TABLES.items()
+            title: [variable for variable in variables if _kind_of(variable) == kind_of]
+            for title, kind_of in TABLES.items()
+            if kind_of != FURTHER or description.modelExchange is not None
         },
     )
+
+
+def _kind_of(variable: ScalarVariable) -> str:
+    """Causality of a variable, but of local ones those apart that model exchange adds."""
+    is_further = variable.name.startswith(("der(", "event_indicator_"))
+    return FURTHER if is_further else str(variable.causality)
 
 
 @cache

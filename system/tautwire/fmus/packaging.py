@@ -85,7 +85,8 @@ def build_fmus(
 
     FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. ``native`` FMUs are machine code for
     ``platforms``, by default this machine's, with their source, and need no Python; they can also be of ``fmi`` 3, the
-    major version, and are for model exchange too unless they are to be ``co_simulation_only``. So are those of a robot that asks for ``native_fmus``. User FMUs stay where they are.
+    major version, and do model exchange too unless they are to be ``co_simulation_only``. So are those of a robot that
+    asks for ``native_fmus``. User FMUs stay where they are.
     The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
     from 0 to 1. Returns the paths of the FMUs.
 

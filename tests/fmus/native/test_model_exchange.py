@@ -10,21 +10,20 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from tautwire.fmus.native.native_archive import python_slave
-from tautwire.fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, winch_resource
+from tautwire.fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource
 from tautwire.robot.schema import Robot
 from tautwire_fmu.cable_slave import AppliedMotion, Cable
 from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.winch_drive import DriveState
 from tests.rig import simulate
-from tests.support.effect_cases import CASES, UNLISTED_CASES, Case, same
+from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.effects import with_effects
 from tests.support.model_exchange import AXES, Model, coupled_models, in_model_exchange
 from tests.support.rig_robots import rig_of
 from tests.support.rigid_robots import crane_robot
-from tests.support.robots import LIMITED, example, paper_robot, with_winch
+from tests.support.robots import example, paper_robot
+from tests.support.winches import SwayingWinches
 
 Array = NDArray[np.float64]
 Rates = Callable[[float, Array], Any]
@@ -33,23 +32,6 @@ Rates = Callable[[float, Array], Any]
 SAME, RIG_ERROR = 1e-10, 1e-11
 EVENT_ERROR = 1e-6  # s
 TIMES = np.linspace(0.0, 1.0, 6)
-
-
-class SwayingWinches:
-    """Smooth speeds of winches, as the rig takes them."""
-
-    kinks = ()
-
-    def __init__(self, sizes: Sequence[float]) -> None:
-        self.sizes = np.array(sizes)
-
-    def speed(self, time: float) -> Array:
-        """In m/s."""
-        return np.asarray(self.sizes * np.sin(3.0 * time))
-
-    def travel(self, time: float) -> Array:
-        """In m."""
-        return np.asarray(self.sizes * (1.0 - np.cos(3.0 * time)) / 3.0)
 
 
 def position_beside_rig(robot: Robot, sizes: Sequence[float], times: Array, folder: Path) -> tuple[Array, Array]:
@@ -88,7 +70,9 @@ def swaying_end(start: Sequence[float], time: float) -> AppliedMotion:
 
 def cable_inputs(motion: AppliedMotion) -> dict[str, float]:
     vectors = dict(zip(("position", "velocity", "acceleration"), motion[:3], strict=True))
-    named = {f"{name}.{axis}": float(v) for name, vector in vectors.items() for axis, v in zip(AXES, vector, strict=True)}
+    named = {
+        f"{name}.{axis}": float(v) for name, vector in vectors.items() for axis, v in zip(AXES, vector, strict=True)
+    }
     return {**named, "winch_speed": motion.winch_speed, "winch_acceleration": motion.winch_acceleration}
 
 

@@ -44,14 +44,20 @@ def plain_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 
 
 def described_variables(description: ModelDescription) -> list[tuple[object, ...]]:
+    """All but those of model exchange."""
     return [
         (v.name, v.valueReference, v.causality, v.variability, v.initial, v.start, v.unit, v.min, v.max, v.nominal)
         for v in description.modelVariables
+        if not v.name.startswith(("der(", "event_indicator_"))
     ]
 
 
 def dependencies(description: ModelDescription) -> list[tuple[str, list[str]]]:
-    return [(u.variable.name, [known.name for known in u.dependencies or []]) for u in description.outputs]
+    """Inputs on which each output depends."""
+    return [
+        (u.variable.name, [known.name for known in u.dependencies or [] if known.causality == "input"])
+        for u in description.outputs
+    ]
 
 
 def test_variables_are_those_of_the_python_fmus(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:

@@ -40,7 +40,7 @@ EQUATIONS_FILE = "equations.c"
 DELAY_FILE = "delayed_signal.c"
 SLAVE_FILES = ("slave.c", "partial_derivatives.c")
 FMI_FILES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
-MODEL_EXCHANGE_FILES = {2: ("model_exchange.c", "fmi2_model_exchange.c")}
+MODEL_EXCHANGE_FILES = {fmi: ("model_exchange.c", f"fmi{fmi}_model_exchange.c") for fmi in FMI_FILES}
 # The input whose rate another input is, by the names without axis.
 RATE_NAMES = {
     "position": "velocity",
@@ -86,7 +86,7 @@ def component_sources(
     ``fmi`` is the major version of FMI; without ``model_exchange`` the component is for co-simulation only.
     """
     component = COMPONENTS[kind](slave, data)
-    if not model_exchange or fmi == 3:
+    if not model_exchange:
         component = replace(component, indicator_count=None)
     further = () if component.indicator_count is None else further_variables(slave, component.indicator_count)
     shared = ("numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", DELAY_FILE, *SLAVE_FILES)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element, SubElement
 
 INDEPENDENT_VARIABLE = "time"
+FMI_2_ATTRIBUTES = ("fmiVersion", "guid", "numberOfEventIndicators")
+STRUCTURE_TAGS = {"Output": "Outputs", "ContinuousStateDerivative": "Derivatives", "InitialUnknown": "InitialUnknowns"}
 REAL_ATTRIBUTES = ("start", "unit", "min", "max", "nominal")
 
 
@@ -13,11 +15,11 @@ def fmi3_description(fmi2: Element) -> Element:
 
     In FMI 3.0 references to variables are value references, not their places in the list.
     """
-    attributes = {name: value for name, value in fmi2.attrib.items() if name not in ("fmiVersion", "guid")}
+    attributes = {name: value for name, value in fmi2.attrib.items() if name not in FMI_2_ATTRIBUTES}
     root = Element(
         "fmiModelDescription", {"fmiVersion": "3.0", **attributes, "instantiationToken": fmi2.attrib["guid"]}
     )
-    root.append(_cosimulation(fmi2))
+    root.extend([*_model_exchange(fmi2), _cosimulation(fmi2)])
     for name in ("UnitDefinitions", "LogCategories", "DefaultExperiment"):
         part = fmi2.find(name)
         if part is not None:
@@ -52,6 +54,23 @@ def build_description(name: str, entry_file: str) -> Element:
     return root
 
 
+def _model_exchange(fmi2: Element) -> list[Element]:
+    return [
+        Element(
+            "ModelExchange",
+            {
+                "modelIdentifier": former.attrib["modelIdentifier"],
+                "needsExecutionTool": "false",
+                "canBeInstantiatedOnlyOncePerProcess": "false",
+                "canGetAndSetFMUState": "true",
+                "canSerializeFMUState": "true",
+                "needsCompletedIntegratorStep": "true",
+            },
+        )
+        for former in fmi2.findall("ModelExchange")
+    ]
+
+
 def _cosimulation(fmi2: Element) -> Element:
     former = fmi2.find("CoSimulation")
     assert former is not None
@@ -82,11 +101,14 @@ def _float_variable(variable: Element, references: list[str]) -> Element:
 
 def _structure(fmi2: Element, references: list[str]) -> Element:
     structure = Element("ModelStructure")
-    for tag, former in (("Output", "Outputs"), ("InitialUnknown", "InitialUnknowns")):
+    indicator_count = int(fmi2.get("numberOfEventIndicators", "0"))
+    for tag, former in STRUCTURE_TAGS.items():
         for unknown in fmi2.findall(f"ModelStructure/{former}/Unknown"):
             attributes = {"valueReference": references[int(unknown.attrib["index"]) - 1]}
             if "dependencies" in unknown.attrib:
                 places = unknown.attrib["dependencies"].split()
                 attributes["dependencies"] = " ".join(references[int(place) - 1] for place in places)
             SubElement(structure, tag, attributes)
+    for reference in references[len(references) - indicator_count :]:
+        SubElement(structure, "EventIndicator", {"valueReference": reference})
     return structure

@@ -78,9 +78,7 @@ def _add_variables(root: Element, slave: Slave, further: Sequence[Variable]) -> 
 
 def _complete_structure(root: Element, slave: Slave, state_count: int) -> None:
     """Outputs depend on states too; derivatives may depend on all that is known, and have to be known at the start."""
-    structure, outputs, unknowns = (
-        root.find(f"ModelStructure{part}") for part in ("", "/Outputs", "/InitialUnknowns")
-    )
+    structure, outputs, unknowns = (root.find(f"ModelStructure{part}") for part in ("", "/Outputs", "/InitialUnknowns"))
     assert structure is not None and outputs is not None and unknowns is not None
     states = range(slave.states.start + 1, slave.states.stop + 1)
     for output in outputs:

@@ -144,9 +144,7 @@ def trace_derivative(name: str, inputs: Mapping[str, int], equations: Equations,
     return trace_function(name, {**inputs, "seed": inputs[varying]}, derivative)
 
 
-def trace_kinks(
-    name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]
-) -> TracedFunction:
+def trace_kinks(name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]) -> TracedFunction:
     """Trace the ``indicators`` of ``equations``: numbers at whose zeros some output has a kink.
 
     They are the arguments of absolute values, maxima and branches, each once, that change with the columns ``varying``.

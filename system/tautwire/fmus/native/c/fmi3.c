@@ -1,8 +1,8 @@
-/* FMI 3.0 co-simulation functions. */
+/* FMI 3.0 functions, but those of model exchange. */
 
 #include "fmi3Functions.h"
 
-#define TIME_REFERENCE VARIABLE_COUNT
+#define TIME_REFERENCE REFERENCE_COUNT
 
 typedef struct {
   Slave slave;
@@ -32,26 +32,33 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t count, con
   return fmi3OK;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                         fmi3Boolean logging_on, fmi3Boolean event_mode, fmi3Boolean early_return,
-                                         const fmi3ValueReference intermediate[], size_t count,
-                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
-                                         fmi3IntermediateUpdateCallback update) {
+/* An instance of some interface; `fault` tells why there can be none. */
+static fmi3Instance new_instance(fmi3String token, const char *fault, fmi3Boolean logging_on,
+                                 fmi3InstanceEnvironment environment, fmi3LogMessageCallback log, int is_model_exchange) {
   Instance3 *instance = (Instance3 *)calloc(1, sizeof *instance);
-  (void)name, (void)resources, (void)visible, (void)event_mode, (void)early_return, (void)intermediate, (void)update;
   if (!instance) return NULL;
   instance->log = log;
   instance->environment = environment;
   instance->logging_on = logging_on;
   instance->slave.log = log_to_importer;
   instance->slave.owner = instance;
-  if (count || !token || strcmp(token, model_guid)) {
-    refuse(instance, count ? "this FMU has no intermediate variables" : "the token is not that of this FMU");
+  instance->slave.is_model_exchange = is_model_exchange;
+  if (fault || !token || strcmp(token, model_guid)) {
+    refuse(instance, fault ? fault : "the token is not that of this FMU");
     free(instance);
     return NULL;
   }
   reset_slave(&instance->slave);
   return instance;
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging_on, fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[], size_t count,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update) {
+  (void)name, (void)resources, (void)visible, (void)event_mode, (void)early_return, (void)intermediate, (void)update;
+  return new_instance(token, count ? "this FMU has no intermediate variables" : NULL, logging_on, environment, log, 0);
 }
 
 void fmi3FreeInstance(fmi3Instance c) {
@@ -75,13 +82,12 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
   Slave *slave = &((Instance3 *)c)->slave;
   if (!is_allowed(slave, INITIALIZATION, "fmi3ExitInitializationMode") || check_inputs(slave) != STATUS_OK)
     return fmi3Error;
-  slave->phase = STEPPING;
-  return fmi3OK;
+  return (fmi3Status)leave_initialization(slave);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance c) {
   Slave *slave = &((Instance3 *)c)->slave;
-  if (!is_allowed(slave, STEPPING, "fmi3Terminate")) return fmi3Error;
+  if (!is_running(slave) && !is_allowed(slave, STEPPING, "fmi3Terminate")) return fmi3Error;
   slave->phase = TERMINATED;
   return fmi3OK;
 }

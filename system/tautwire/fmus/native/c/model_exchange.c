@@ -15,10 +15,16 @@ static void set_time(Slave *slave, double time) {
   slave->outputs_stale = 1;
 }
 
-static int set_states(Slave *slave, const double *states) {
+static void set_states(Slave *slave, const double *states) {
   memcpy(slave->state.real + FIRST_STATE, states, STATE_COUNT * sizeof(double));
   slave->outputs_stale = 1;
-  return STATUS_OK;
+}
+
+/* Whether states, their derivatives and event indicators may be had. */
+static int has_states_to_give(const Slave *slave) {
+  if (slave->is_model_exchange && slave->phase != INSTANTIATED) return 1;
+  log_message(slave, STATUS_ERROR, "states and event indicators: in model exchange only, and from initialization on");
+  return 0;
 }
 
 static int get_states(Slave *slave, double *states) {
