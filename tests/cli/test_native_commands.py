@@ -55,6 +55,7 @@ def test_simulate_runs_native_fmus_to_the_same_result(robot_file: Path, tmp_path
         (["--platforms", "win64"], ["--platforms", "add --native"]),
         (["--native", "--platforms", "amiga"], ["'amiga'", "linux64"]),
         (["--fmi", "3"], ["--fmi", "--native"]),
+        (["--co-simulation-only"], ["--co-simulation-only", "--native"]),
         (["--native", "--fmi", "4"], ["--fmi", "is 4"]),
     ],
 )

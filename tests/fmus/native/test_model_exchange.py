@@ -149,6 +149,7 @@ def cable_differences(robot: Robot, fmus: RobotFmus, number: int, left_out: Sequ
         return slave._rates(list(states), slave._span(motion(time)), motion(time).winch_speed)
 
     with in_model_exchange(fmus.cables[number - 1]) as model:
+        assert model.indicators()[0] == model.get("pull")[0]
         return differences(model, slave, rates, lambda time: cable_inputs(motion(time)), left_out)
 
 

@@ -12,7 +12,15 @@ from tautwire_fmu.laws.effects import ActiveEffect, Effect
 from tautwire_fmu.laws.mathematics import Mathematics
 
 from .interpolation_functions import MOTION_SIZE
-from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function, trace_kinks
+from .traced_functions import (
+    INDICATORS,
+    Columns,
+    TracedFunction,
+    rates_along,
+    trace_derivative,
+    trace_function,
+    trace_kinks,
+)
 
 DECLARED_PARAMETERS = 11
 START_SIZE = 7
@@ -34,7 +42,7 @@ def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("cable_rates", {"motion": MOTION_SIZE, **known}, cable.rates),
         trace_function("cable_outputs", {"motion": MOTION_SIZE, **known}, cable.outputs),
         trace_derivative("cable_derivative", {"motion": MOTION_SIZE, **known}, cable.outputs, "motion"),
-        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **known}, cable.outputs, ("motion", "states")),
+        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **known}, cable.kinks, ("motion", "states")),
     )
 
 
@@ -84,6 +92,10 @@ class _Cable:
             "outputs": [*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull],
             "output_rates": rates_along([*shown.force, shown.tension], varying, varying_rates),
         }
+
+    def kinks(self, m: Mathematics, columns: Columns) -> Columns:
+        """The pull, at whose zeros the cable falls slack or becomes taut; tracing finds all other kinks."""
+        return {INDICATORS: self.outputs(m, columns)["outputs"][-1:]}
 
     def _constants(
         self, m: Mathematics, parameters: Sequence[Any], start: Sequence[Any]

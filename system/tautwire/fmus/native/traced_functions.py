@@ -147,13 +147,15 @@ def trace_derivative(name: str, inputs: Mapping[str, int], equations: Equations,
 def trace_kinks(name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]) -> TracedFunction:
     """Trace the ``indicators`` of ``equations``: numbers at whose zeros some output has a kink.
 
-    They are the arguments of absolute values, maxima and branches, each once, that change with the columns ``varying``.
+    They are the arguments of absolute values, maxima and branches, each once, that change with the columns ``varying``;
+    those that the equations themselves give as ``indicators`` come first.
     """
 
     def indicators(recorder: Recorder, columns: Columns) -> Columns:
-        equations(recorder.mathematics(), columns)
+        first = equations(recorder.mathematics(), columns).get(INDICATORS, ())
         variables = column([entry for each in varying for entry in columns[each]])
-        switches = casadi.vertsplit(casadi.cse(column(recorder.switches))) if recorder.switches else []
+        kinks = column([*first, *recorder.switches])
+        switches = casadi.vertsplit(casadi.cse(kinks)) if kinks.numel() else []
         distinct = {each.element_hash(): each for each in switches if casadi.depends_on(each, variables)}
         return {INDICATORS: list(distinct.values())}
 
