@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pandas as pd
 import pytest
@@ -33,6 +34,13 @@ def test_build_writes_libraries_and_source_without_python(
     assert not [name for name in names if name.endswith(".py")]
     assert "sources/all.c" in names
     assert [name for name in names if name.startswith(f"binaries/{folder}")]
+
+
+@pytest.mark.parametrize("options", [[], ["--co-simulation-only"]], ids=["both", "alone"])
+def test_build_leaves_model_exchange_out_by_an_option(robot_file: Path, options: list[str], tmp_path: Path) -> None:
+    assert run(["build", str(robot_file), "--out", str(tmp_path / "out"), "--native", *options]) == 0
+    interface = fmpy.read_model_description(str(tmp_path / "out" / "platform.fmu")).modelExchange
+    assert (interface is None) == bool(options)
 
 
 def test_simulate_runs_native_fmus_to_the_same_result(robot_file: Path, tmp_path: Path) -> None:
