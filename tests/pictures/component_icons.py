@@ -59,10 +59,18 @@ def _controller(canvas: ImageDraw.ImageDraw) -> None:
     canvas.line(_points(22, 62, 36, 62, 36, 46, 50, 46, 50, 34, 74, 34), fill=INK, width=LINE)
 
 
+def _robot(canvas: ImageDraw.ImageDraw) -> None:
+    canvas.rectangle(_points(8, 8, 88, 88), outline=INK, width=LINE)
+    for corner in ((10, 10), (86, 10), (10, 86), (86, 86)):
+        canvas.line(_points(*corner, 48, 50), fill=INK, width=LINE)
+    canvas.rectangle(_points(32, 36, 64, 64), fill=FILL, outline=INK, width=LINE)
+
+
 ICONS: dict[str, Callable[[ImageDraw.ImageDraw], None]] = {
     "cable": _cable,
     "point_mass": _platform,
     "rigid_body": _rigid_platform,
     "winch": _winch,
     "controller": _controller,
+    "robot": _robot,
 }

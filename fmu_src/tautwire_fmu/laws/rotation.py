@@ -89,6 +89,15 @@ def rotation_matrix(quaternion: Quaternion) -> Matrix:
     )
 
 
+def quaternion_rate(quaternion: Quaternion, angular_velocity: Vector) -> Quaternion:
+    """Rate of a unit quaternion by the angular velocity in the turned axes (rad/s): ``dq/dt = q (0, omega) / 2``.
+
+    Source: Hairer, Lubich and Wanner (2006), Geometric Numerical Integration, section VII.5.
+    """
+    w, x, y, z = multiply(quaternion, (0.0, *angular_velocity))
+    return (0.5 * w, 0.5 * x, 0.5 * y, 0.5 * z)
+
+
 def rotation_vector_rate(m: Mathematics, rotation_vector: Vector, angular_velocity: Vector) -> Vector:
     """Rate of a rotation vector r (rad) by the angular velocity (rad/s), both in the axes of the turned body.
 

@@ -20,13 +20,16 @@ from tautwire_fmu.laws.effects import BY_NAME
 if TYPE_CHECKING:
     from jinja2 import Template
 
-LAWS: Mapping[str, ModuleType] = {
-    "cable": cable,
-    "point_mass": point_mass,
-    "rigid_body": rigid_body,
-    "winch": winch_drive,
-    "controller": sampled_control,
+LAWS: Mapping[str, tuple[ModuleType, ...]] = {
+    "cable": (cable,),
+    "point_mass": (point_mass,),
+    "rigid_body": (rigid_body,),
+    "winch": (winch_drive,),
+    "controller": (sampled_control,),
+    "robot": (cable, point_mass, rigid_body, winch_drive),
 }
+# Modules that say what goes in and out, where it is not the slave of this kind in the package that FMUs contain.
+SLAVE_MODULES = {"robot": ("tautwire.fmus.native", "robot_slave.py")}
 # What model exchange adds.
 FURTHER = "further"
 TABLES = {
@@ -69,7 +72,7 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
         tool=description.generationTool,
         component_blocks=_text_blocks(_slave_docstring(kind)),
         law=data.get("law"),
-        law_blocks=_text_blocks(LAWS[kind].__doc__ or ""),
+        law_blocks=[block for law in LAWS[kind] for block in _text_blocks(law.__doc__ or "")],
         effects=[BY_NAME[setting["name"]] for setting in data.get("effects", ())],
         formulas=data.get("formulas") or {},
         has_model_exchange=description.modelExchange is not None,
@@ -119,7 +122,8 @@ def _package_license(package: str) -> str:
 @cache
 def _slave_docstring(kind: str) -> str:
     """What goes in and out, read from the source: an import would bring in pythonfmu, perhaps that of a loaded FMU."""
-    source = files("tautwire_fmu").joinpath(f"{kind}_slave.py").read_text(encoding="utf-8")
+    package, name = SLAVE_MODULES.get(kind, ("tautwire_fmu", f"{kind}_slave.py"))
+    source = files(package).joinpath(name).read_text(encoding="utf-8")
     return (ast.get_docstring(ast.parse(source)) or "").partition(" of ")[2]
 
 

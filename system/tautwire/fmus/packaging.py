@@ -25,7 +25,7 @@ from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import start_attachments, start_orientation, static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
 from .fmu_archive import put_atomically
-from .fmu_slots import check_user_fmus
+from .fmu_slots import SlotError, check_user_fmus
 from .pythonfmu_builder import FmuWriter, pythonfmu_writer
 
 
@@ -114,6 +114,35 @@ def build_fmus(
         has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
         is_rigid=robot.platform.is_rigid_body,
     )
+
+
+def build_whole_fmu(
+    robot: Robot,
+    folder: str | Path,
+    progress: Callable[[float], None] | None = None,
+    platforms: Sequence[str] = (),
+    fmi: int = 2,
+) -> Path:
+    """Write ``robot.fmu`` into ``folder``: platform, cables and winches of a robot in one native FMU.
+
+    Its inputs are the winch speeds and the external load, its outputs pose, tensions and rope lengths; all states are
+    integrated together. ``platforms``, ``fmi``, ``folder`` and ``progress`` as for :func:`build_fmus`. Returns its path.
+
+    Raises SlotError where the robot file names FMUs of the user, UnreachableError where the cables cannot hold the
+    platform at the start, NativeBuildError where it cannot be compiled, ArgumentError where an argument is none of
+    these, OSError where the disk refuses.
+    """
+    validate_robot("build_whole_fmu: robot", robot)
+    folder = validate_folder("build_whole_fmu: folder", folder)
+    validate_callable("build_whole_fmu: progress", progress)
+    for fmu in robot.fmus:
+        problem = "the whole robot as one FMU has its own equations in every slot"
+        raise SlotError(fmu.path, fmu.slot, None, problem, f"build it without the {fmu.slot} under [fmu]")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = native_fmu_writer(platforms, fmi)("robot", "WholeRobot", "robot", robot_resource(robot), folder)
+    if progress is not None:
+        progress(1.0)
+    return path
 
 
 def _components(robot: Robot) -> dict[str, tuple[str, str, dict[str, Any]]]:
@@ -249,6 +278,25 @@ def _rotation_resource(robot: Robot) -> dict[str, Any]:
         "start_angular_velocity": list(assemble_robot(robot).angular_velocity),
         "attachments": [list(attachment) for attachment in robot.attachments],
         "start_attachments": [list(attachment) for attachment in start_attachments(robot)],
+    }
+
+
+def robot_resource(robot: Robot) -> dict[str, Any]:
+    """Resource of a whole robot: those of its components, and what its page tells of them together."""
+    platform, cables = platform_resource(robot), cable_resources(robot)
+    parts = {"platform": platform, **{f"cable_{i}": each for i, each in enumerate(cables, start=1)}}
+    effects = [effect for each in parts.values() for effect in each["effects"]]
+    formulas = {
+        f"{name}, {quantity}": texts for name, each in parts.items() for quantity, texts in each["formulas"].items()
+    }
+    return {
+        "description": f"{robot.name}: platform, cables and winches in one",
+        "is_rigid": robot.platform.is_rigid_body,
+        "platform": platform,
+        "cables": cables,
+        "winches": [winch_resource(robot, i) for i in robot.winch_numbers],
+        "effects": list({effect["name"]: effect for effect in effects}.values()),
+        "formulas": formulas,
     }
 
 

@@ -24,6 +24,8 @@ from .traced_functions import (
 
 DECLARED_PARAMETERS = 11
 START_SIZE = 7
+# Position and velocity of a cable's end.
+END_SIZE = 6
 
 
 def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
@@ -32,27 +34,45 @@ def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
     ``start`` are what follows from the parameters: length, direction, sensor delay, whether effects' states
     move, and tension at the load cell behind a filter.
     """
-    effects = effects_from_resource(dict(data))
-    states = 2 + sum(len(effect.states) for effect in effects)
-    parameters = DECLARED_PARAMETERS + sum(len(effect.parameters) for effect in effects)
-    cable = _Cable(effects, law.LAWS[data["law"]], tuple(data["swivel_axis"]))
-    known = {"states": states, "parameters": parameters, "start": START_SIZE}
+    cable = _Cable(data)
     return (
-        trace_function("cable_start", {"parameters": parameters}, cable.start),
-        trace_function("cable_rates", {"motion": MOTION_SIZE, **known}, cable.rates),
-        trace_function("cable_outputs", {"motion": MOTION_SIZE, **known}, cable.outputs),
-        trace_derivative("cable_derivative", {"motion": MOTION_SIZE, **known}, cable.outputs, "motion"),
-        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **known}, cable.kinks, ("motion", "states")),
+        *cable.shared_functions(),
+        trace_function("cable_rates", {"motion": MOTION_SIZE, **cable.known}, cable.rates),
+        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **cable.known}, cable.kinks, ("motion", "states")),
+    )
+
+
+def whole_robot_cable_functions(data: Mapping[str, Any], kind: int) -> tuple[TracedFunction, ...]:
+    """As :func:`cable_functions`, with the number of the ``kind`` behind the names.
+
+    In place of the rates there is ``cable_action``: rates of the states, and the force on the platform.
+    """
+    cable, suffix = _Cable(data), f"_{kind}"
+    return (
+        *cable.shared_functions(suffix),
+        trace_function(f"cable_action{suffix}", {"end": END_SIZE, "speed": 1, **cable.known}, cable.action),
     )
 
 
 class _Cable:
     """Equations of a cable as functions of its columns."""
 
-    def __init__(self, effects: Sequence[Effect], tension_law: law.TensionLaw, swivel_axis: tuple[float, ...]) -> None:
-        self.listed_effects = effects
-        self.tension_law = tension_law
-        self.swivel_axis = swivel_axis
+    def __init__(self, data: Mapping[str, Any]) -> None:
+        self.listed_effects: Sequence[Effect] = effects_from_resource(dict(data))
+        self.tension_law = law.LAWS[data["law"]]
+        self.swivel_axis = tuple(data["swivel_axis"])
+        states = 2 + sum(len(effect.states) for effect in self.listed_effects)
+        parameters = DECLARED_PARAMETERS + sum(len(effect.parameters) for effect in self.listed_effects)
+        self.known = {"states": states, "parameters": parameters, "start": START_SIZE}
+
+    def shared_functions(self, suffix: str = "") -> tuple[TracedFunction, ...]:
+        """Functions of any cable, with a suffix behind their names."""
+        motion = {"motion": MOTION_SIZE, **self.known}
+        return (
+            trace_function(f"cable_start{suffix}", {"parameters": self.known["parameters"]}, self.start),
+            trace_function(f"cable_outputs{suffix}", motion, self.outputs),
+            trace_derivative(f"cable_derivative{suffix}", motion, self.outputs, "motion"),
+        )
 
     def start(self, m: Mathematics, columns: Columns) -> Columns:
         """What follows from the parameters, see :func:`cable_functions`, and the states at the start."""
@@ -77,6 +97,15 @@ class _Cable:
         line = law.span(m, constants, inputs, effects)
         motion = law.cable_motion(m, constants, effects, state, line, inputs.winch_speed)
         return {"rates": _flat_state(law.state_rates(m, constants, effects, state, motion))}
+
+    def action(self, m: Mathematics, columns: Columns) -> Columns:
+        """Rates of the states, and the force on the platform."""
+        constants, effects = self._constants(m, columns["parameters"], columns["start"])
+        end, speed, state = columns["end"], columns["speed"][0], _state(effects, columns["states"])
+        line = law.span(m, constants, law.CableInputs(end[:3], end[3:], speed), effects)
+        motion = law.cable_motion(m, constants, effects, state, line, speed)
+        rates = law.state_rates(m, constants, effects, state, motion)
+        return {"rates": _flat_state(rates), "force": law.cable_outputs(m, constants, effects, state, motion).force}
 
     def outputs(self, m: Mathematics, columns: Columns) -> Columns:
         """Outputs in the order of the FMU's variables, then the rates of force and tension."""

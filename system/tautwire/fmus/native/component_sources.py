@@ -29,6 +29,9 @@ from .interpolation_functions import (
 from .model_exchange import further_variables
 from .platform_functions import POINT_MASS_PARAMETERS, SENSOR_SIZE, mass_functions
 from .rigid_body_functions import rigid_body_functions, start_size
+from .robot_functions import robot_functions, robot_structure
+from .robot_slave import WholeRobot
+from .robot_structure import robot_constants, robot_macros, robot_state_scales
 from .traced_functions import INDICATORS, LARGEST_NUMBER, TracedFunction, c_source
 from .winch_functions import DRIVE_SIZE, LIMIT_COUNT, winch_functions
 
@@ -175,18 +178,28 @@ def _controller(slave: Slave, data: Mapping[str, Any]) -> _Component:
     return _Component(("sampled_control.c", "controller.c"), macros, constants)
 
 
+def _robot(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    assert isinstance(slave, WholeRobot)
+    scales = robot_state_scales(slave, data)
+    c_files = ("principal_axes.c", "robot.c")
+    return _Component(c_files, robot_macros(slave, data), robot_constants(data), scales)
+
+
 COMPONENTS: Mapping[str, Callable[[Slave, Mapping[str, Any]], _Component]] = {
     "cable": _cable,
     "point_mass": _point_mass,
     "rigid_body": _rigid_body,
     "winch": _winch,
     "controller": _controller,
+    "robot": _robot,
 }
 # Of a resource all that equations depend on; effects do by their names.
 EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas", "attachments")
 
 
 def _equation_structure(data: Mapping[str, Any]) -> str:
+    if "cables" in data:
+        return json.dumps(robot_structure(data), sort_keys=True)
     effects = [{**effect, "values": None} for effect in data.get("effects", ())]
     attachments = [None for _ in data.get("attachments", ())]
     structure = {name: data.get(name) for name in EQUATION_KEYS}
@@ -210,6 +223,8 @@ def _equations(kind: str, structure: str) -> tuple[TracedFunction, ...]:
         functions = (*mass_functions(data, POINT_MASS_PARAMETERS), *quadrature_functions(), quintic_function())
     elif kind == "rigid_body":
         functions = (*rigid_body_functions(data), *quadrature_functions(), quintic_function())
+    elif kind == "robot":
+        functions = robot_functions(data)
     else:
         functions = winch_functions() if kind == "winch" else ()
     return (*functions, cubic_function())
@@ -276,9 +291,10 @@ def rate_references(variables: Sequence[Variable]) -> list[int]:
 
 def _input_rate_name(name: str) -> str:
     base, dot, axis = name.partition(".")
-    load = re.fullmatch(r"((?:external_)?(?:force|moment))(_\d+)?", base)
-    rate = f"{load[1]}_rate{load[2] or ''}" if load else RATE_NAMES.get(base, "")
-    return f"{rate}{dot}{axis}"
+    stem = re.sub(r"_\d+$", "", base)
+    is_load = re.fullmatch(r"(external_)?(force|moment)", stem)
+    rate = f"{stem}_rate" if is_load else RATE_NAMES.get(stem, "")
+    return f"{rate}{base[len(stem) :]}{dot}{axis}"
 
 
 def _bound(value: float | None, absent: float) -> float:

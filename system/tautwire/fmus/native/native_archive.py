@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +14,6 @@ from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from tautwire_fmu import slaves
 from tautwire_fmu.model_description import Variable
 from tautwire_fmu.slave import Slave
 
@@ -27,6 +25,8 @@ from .c_toolchain import PLATFORMS, TargetPlatform, Toolchain, compile_library, 
 from .component_sources import ENTRY_FILE, component_sources, rate_references
 from .fmi3_description import build_description, fmi3_description
 from .model_exchange import add_model_exchange
+from .python_slaves import python_slave
+from .robot_slave import whole_robot_slave
 from .universal_binary import ARM_64, X86_64, universal_binary
 
 FMI_VERSIONS = (2, 3)
@@ -69,7 +69,7 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     Raises NativeBuildError where the compiler refuses.
     """
     unidentified = dict(data) | {"guid": "", "version": __version__}
-    slave = python_slave(kind, base, unidentified)
+    slave = whole_robot_slave(unidentified) if kind == "robot" else python_slave(kind, base, unidentified)
     interfaces = (target.fmi, target.model_exchange)
     anonymous = component_sources(kind, slave, unidentified, "", *interfaces).files
     slave.guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
@@ -104,14 +104,6 @@ def _xml(root: Element) -> bytes:
     indent(root, "\t")
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text
-
-
-def python_slave(kind: str, base: str, data: Mapping[str, Any]) -> Slave:
-    """The Python slave of a component's resource: its variables, and the values that they start with."""
-    with tempfile.TemporaryDirectory(prefix="tautwire-build-") as resources:
-        (Path(resources) / f"{kind}.json").write_text(json.dumps(data), encoding="utf-8")
-        slave: Slave = getattr(slaves, base)(instance_name=data["model_name"], resources=resources)
-    return slave
 
 
 def native_description(slave: Slave, fmi: int, further: Sequence[Variable] = ()) -> Element:

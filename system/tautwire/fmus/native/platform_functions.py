@@ -10,7 +10,7 @@ from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws import point_mass as law
 from tautwire_fmu.laws.effects import Effect
 from tautwire_fmu.laws.mathematics import Mathematics
-from tautwire_fmu.laws.vectors import add
+from tautwire_fmu.laws.vectors import Vector, add
 
 from .traced_functions import Columns, TracedFunction, rates_along, trace_derivative, trace_function, trace_kinks
 
@@ -27,7 +27,7 @@ def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tupl
     """
     effects = effects_from_resource(dict(data))
     parameters = first_effect_parameter + sum(len(effect.parameters) for effect in effects)
-    mass = _Mass(effects, first_effect_parameter)
+    mass = Mass(effects, first_effect_parameter)
     known = {"mass": 6, "force_and_rate": 6, "time": 1, "parameters": parameters}
     return (
         trace_function("platform_sensor", {"parameters": parameters}, mass.sensor),
@@ -37,7 +37,7 @@ def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tupl
     )
 
 
-class _Mass:
+class Mass:
     """Equations of a platform's mass as functions of its columns."""
 
     def __init__(self, effects: Sequence[Effect], first_effect_parameter: int) -> None:
@@ -58,13 +58,18 @@ class _Mass:
 
     def node(self, m: Mathematics, columns: Columns) -> Columns:
         """Acceleration under a force, and its rate where position, velocity, force and time change at theirs."""
-        parameters, time = columns["parameters"], columns["time"][0]
-        effects = active_effects(self.listed_effects, parameters[self.first_effect_parameter :])
-        constants = law.PointMassConstants(mass=parameters[0], gravity=parameters[1])
-        states = [(time,) if active.effect.states else () for active in effects]
-        mass, force_and_rate = columns["mass"], columns["force_and_rate"]
-        force = add(force_and_rate[:3], law.wrench(m, effects, states, mass[:3], mass[3:]))
-        acceleration = law.acceleration(m, constants, effects, states, force)
+        time, mass, force_and_rate = columns["time"][0], columns["mass"], columns["force_and_rate"]
+        acceleration = self.acceleration_under(m, columns["parameters"], mass, force_and_rate[:3], time)
         varying = [*mass, *force_and_rate[:3], time]
         rates = [*mass[3:], *acceleration, *force_and_rate[3:], 1.0]
         return {"node": [*acceleration, *rates_along(acceleration, varying, rates)]}
+
+    def acceleration_under(
+        self, m: Mathematics, parameters: Sequence[Any], mass: Sequence[Any], force: Vector, time: Any
+    ) -> Vector:
+        """Acceleration of the mass, by its position and velocity, under the forces of cables and from outside."""
+        effects = active_effects(self.listed_effects, parameters[self.first_effect_parameter :])
+        constants = law.PointMassConstants(mass=parameters[0], gravity=parameters[1])
+        states = [(time,) if active.effect.states else () for active in effects]
+        total_force = add(force, law.wrench(m, effects, states, mass[:3], mass[3:]))
+        return law.acceleration(m, constants, effects, states, total_force)

@@ -60,8 +60,8 @@ def start_size(cable_count: int) -> int:
 
 
 def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
-    """Functions of a rigid platform's resource, see :class:`_Body`; those of its mass are with them."""
-    body = _Body(data)
+    """Functions of a rigid platform's resource, see :class:`RigidBody`; those of its mass are with them."""
+    body = RigidBody(data)
     sizes = {"parameters": body.parameter_count, "start": start_size(body.cable_count)}
     attitude, load = {"attitude": ATTITUDE_SIZE}, {"load": LOAD_SIZE}
     turning = {"quaternion": 4, "momentum": 3}
@@ -81,7 +81,7 @@ def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
 
 
 def _step_functions(
-    body: _Body, name: str, later_nodes: int, sizes: Mapping[str, int]
+    body: RigidBody, name: str, later_nodes: int, sizes: Mapping[str, int]
 ) -> tuple[TracedFunction, TracedFunction]:
     loads = {"loads": later_nodes * LOAD_SIZE, "step": 1, **sizes}
     first = {"quaternion": 4, "momentum": 3, "first": ATTITUDE_SIZE, "first_moment": 6, "angles": 6}
@@ -92,7 +92,7 @@ def _step_functions(
     )
 
 
-class _Body:
+class RigidBody:
     """Equations of a rigid body as functions of its columns."""
 
     def __init__(self, data: Mapping[str, Any]) -> None:

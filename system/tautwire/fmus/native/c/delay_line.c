@@ -50,28 +50,33 @@ static int append_segment(DelayLine *line, const double *segment, double lag) {
   return 1;
 }
 
-/* Value and rate of each axis a lag before the end of a delay line that has segments; constant before its start. */
-static void delayed_values(const DelayLine *line, double lag, double (*results)[2]) {
-  const double *segment = line->segments;
+/* Value and rate of one axis a lag before the end of a delay line that has segments; constant before its start.
+
+   `derivatives` of the axis count: two make a cubic, three a quintic. */
+static void delayed_signal(const DelayLine *line, double lag, int axis, int derivatives, double *result) {
+  const double *segment = line->segments, *first;
   const double *last = line->segments + (line->count - 1) * SEGMENT_SIZE;
   double time = last[1] - lag, step, fraction, values[3];
-  int axis;
   while (segment != last && time > segment[1]) segment += SEGMENT_SIZE;
   step = segment[1] - segment[0];
   fraction = (time - segment[0]) / step;
-  for (axis = 0; axis < SIGNAL_AXES; axis++) {
-    const double *first = segment + 2 + axis * SIGNAL_DERIVATIVES;
-    if (time < segment[0]) {
-      results[axis][0] = first[0];
-      results[axis][1] = 0.0;
-      continue;
-    }
-#if SIGNAL_DERIVATIVES == 2
-    cubic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
-#else
-    quintic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
-#endif
-    results[axis][0] = values[0];
-    results[axis][1] = values[1];
+  first = segment + 2 + axis * SIGNAL_DERIVATIVES;
+  if (time < segment[0]) {
+    result[0] = first[0];
+    result[1] = 0.0;
+    return;
   }
+#if SIGNAL_DERIVATIVES == 3
+  if (derivatives == 3)
+    quintic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
+  else
+#endif
+    cubic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
+  memcpy(result, values, 2 * sizeof(double));
+}
+
+/* The same of all axes. */
+static void delayed_values(const DelayLine *line, double lag, double (*results)[2]) {
+  int axis;
+  for (axis = 0; axis < SIGNAL_AXES; axis++) delayed_signal(line, lag, axis, SIGNAL_DERIVATIVES, results[axis]);
 }

@@ -1,6 +1,7 @@
 /* Adaptive Runge-Kutta integration (Dormand and Prince) of a component's states over a macro step.
 
-   The same method as dormand_prince.py, from which the tableau comes. `state_rates` is that of the component. */
+   The same method as dormand_prince.py, from which the tableau comes. `state_rates` is that of the component, and
+   STEPS_BACK_INTO_DOMAIN tells whether an inner step that leaves the domain of the law is tried again, shorter. */
 
 static int trial_step(const Slave *slave, double step, int at_end, const double *state, const double *slope, double done,
                       double part, double *next_state, double *next_slope, double *errors) {
@@ -37,42 +38,34 @@ static double scaled_error(const double *errors, double tolerance) {
   return largest / tolerance;
 }
 
-/* States in the middle of the step and at its end; 0 where the law has no value. */
-static int integrate_dormand_prince(const Slave *slave, double step, int at_end, const double *start, double *middle,
-                                    double *end) {
-  double state[STATE_COUNT], slope[STATE_COUNT], next_state[STATE_COUNT], next_slope[STATE_COUNT], errors[STATE_COUNT];
-  double done = 0.0, part = 1.0, error, next, inner_step, fraction;
-  int k;
-  memcpy(state, start, sizeof state);
-  memcpy(middle, start, sizeof state);
-  if (!state_rates(slave, step, 0.0, at_end, state, slope)) return 0;
-  while (done < 1.0) {
-    part = fmin(part, 1.0 - done);
-    if (!trial_step(slave, step, at_end, state, slope, done, part, next_state, next_slope, errors)) return 0;
-    error = scaled_error(errors, slave->relative_tolerance);
-    if (error > 1.0 && part > MIN_STEP_FRACTION) {
-      part = fmax(MIN_STEP_FRACTION, part * fmax(MIN_STEP_FACTOR, SAFETY_FACTOR * pow(error, -0.2)));
-      continue;
-    }
-    next = part < 1.0 - done ? done + part : 1.0;
-    if (done < 0.5 && 0.5 <= next) {
-      inner_step = part * step;
-      fraction = (0.5 - done) / part;
-      for (k = 0; k < STATE_COUNT; k++) {
-        double first[2], last[2], values[2];
-        first[0] = state[k];
-        first[1] = slope[k];
-        last[0] = next_state[k];
-        last[1] = next_slope[k];
-        cubic(first, last, &inner_step, &fraction, values);
-        middle[k] = values[0];
-      }
-    }
-    memcpy(state, next_state, sizeof state);
-    memcpy(slope, next_slope, sizeof slope);
-    done = next;
-    part *= error == 0.0 ? MAX_STEP_FACTOR : fmin(MAX_STEP_FACTOR, SAFETY_FACTOR * pow(error, -0.2));
+/* How far an integration has come: state and slope after a fraction of the macro step, and the next inner step's part. */
+typedef struct {
+  double state[STATE_COUNT], slope[STATE_COUNT];
+  double done, part;
+} Progress;
+
+static int begin_integration(const Slave *slave, double step, int at_end, const double *start, double part, Progress *at) {
+  memcpy(at->state, start, sizeof at->state);
+  at->done = 0.0;
+  at->part = part;
+  return state_rates(slave, step, 0.0, at_end, at->state, at->slope);
+}
+
+/* The next inner step whose error is small enough; 0 where the law has no value. */
+static int inner_step(const Slave *slave, double step, int at_end, const Progress *at, Progress *next) {
+  double errors[STATE_COUNT], part = at->part, error;
+  for (;;) {
+    part = fmin(part, 1.0 - at->done);
+    if (trial_step(slave, step, at_end, at->state, at->slope, at->done, part, next->state, next->slope, errors))
+      error = scaled_error(errors, slave->relative_tolerance);
+    else if (STEPS_BACK_INTO_DOMAIN && part > MIN_STEP_FRACTION)
+      error = HUGE_VAL;
+    else
+      return 0;
+    if (!(error > 1.0 && part > MIN_STEP_FRACTION)) break;
+    part = fmax(MIN_STEP_FRACTION, part * fmax(MIN_STEP_FACTOR, SAFETY_FACTOR * pow(error, -0.2)));
   }
-  memcpy(end, state, sizeof state);
+  next->done = part < 1.0 - at->done ? at->done + part : 1.0;
+  next->part = part * (error == 0.0 ? MAX_STEP_FACTOR : fmin(MAX_STEP_FACTOR, SAFETY_FACTOR * pow(error, -0.2)));
   return 1;
 }
