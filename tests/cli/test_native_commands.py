@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 from pathlib import Path
 
@@ -43,6 +44,14 @@ def test_build_leaves_model_exchange_out_by_an_option(robot_file: Path, options:
     assert (interface is None) == bool(options)
 
 
+def test_build_writes_the_whole_robot_as_one_fmu(
+    robot_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["build", str(robot_file), "--out", str(tmp_path / "out"), "--native", "--whole", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["fmus"] == {"robot": str(tmp_path / "out" / "robot.fmu")}
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["robot.fmu"]
+
+
 def test_simulate_runs_native_fmus_to_the_same_result(robot_file: Path, tmp_path: Path) -> None:
     speeds = {f"winch_speed_{i}": [0.0, 0.05 * i, 0.0] for i in (1, 2, 3)}
     pd.DataFrame({"time": [0.0, 0.2, 0.4]} | speeds).to_csv(tmp_path / "speeds.csv", index=False)
@@ -62,6 +71,7 @@ def test_simulate_runs_native_fmus_to_the_same_result(robot_file: Path, tmp_path
         (["--native", "--for-c-hosts"], ["--for-c-hosts", "leave it out"]),
         (["--platforms", "win64"], ["--platforms", "add --native"]),
         (["--native", "--platforms", "amiga"], ["'amiga'", "linux64"]),
+        (["--whole"], ["--whole", "add --native"]),
         (["--fmi", "3"], ["--fmi", "--native"]),
         (["--co-simulation-only"], ["--co-simulation-only", "--native"]),
         (["--native", "--fmi", "4"], ["--fmi", "is 4"]),

@@ -118,3 +118,16 @@ PAIRS = (
     (same("thermal", rise=10.0, expansion=1.2e-5, time=20.0), same("damping", damping=1.7e9)),
     (same("payload", mass=20.0), same("drag", drag_area=5.0)),
 )
+# Several that act in all stages of a cable and on the platform, and what makes the sensors lag.
+SEVERAL = (
+    same("damping", damping=1.7e9),
+    same("sag", linear_density=0.1),
+    same("pulley", radius=0.15),
+    same("drum", eccentricity=0.02, phase=1.0, radius=0.15),
+    same("friction", coefficient=0.05),
+    same("transverse_damping", damping=40.0),
+    Case("relaxation", {}, BRANCHES),
+    same("payload", mass=20.0),
+    Case("drag", {}, {"drag_area": 5.0, "wind_x": 2.0}),
+)
+DELAYED = same("sensor_delay", tension_delay=0.023, position_delay=0.05)

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..errors import InputError
-from ..robot.schema import fmu_slots
+from ..robot.schema import Robot, fmu_slots
 from .console import (
     AsJson,
     CommandOutput,
@@ -43,6 +43,10 @@ NATIVE_HELP = (
 CO_SIMULATION_HELP = (
     "Build --native FMUs for co-simulation only, without model exchange, which some tools would prefer."
 )
+WHOLE_HELP = (
+    "Build the whole robot as one --native FMU, robot.fmu: winch speeds and an external load in; pose, tensions and "
+    "rope lengths out."
+)
 PLATFORMS_HELP = "Platforms of --native FMUs: linux64, win64, darwin64, aarch64-linux, aarch64-darwin, or all."
 
 
@@ -51,6 +55,7 @@ def build(
     out: Annotated[Path, typer.Option(help="Output folder of the FMUs.")] = Path("build"),
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
     native: Annotated[bool, typer.Option("--native", help=NATIVE_HELP)] = False,
+    whole: Annotated[bool, typer.Option("--whole", help=WHOLE_HELP)] = False,
     platforms: Annotated[str, typer.Option(metavar="LIST", help=PLATFORMS_HELP)] = "",
     fmi: Annotated[int, typer.Option(help="Version of FMI, 2 or 3; the latter for --native FMUs.")] = 2,
     co_simulation_only: Annotated[bool, typer.Option("--co-simulation-only", help=CO_SIMULATION_HELP)] = False,
@@ -59,7 +64,7 @@ def build(
 ) -> None:
     """Build the FMUs of a robot, and an SSP archive of them.
 
-    There is one for each cable and each winch, and one for the platform.
+    There is one for each cable and each winch, and one for the platform; with --whole there is one for all together.
 
     Example: tautwire build robot.toml --out build/
     """
@@ -71,14 +76,18 @@ def build(
 
     output = CommandOutput(as_json, quiet)
     robot = read_holdable_robot(robot_file)
+    targets = [name.strip() for name in platforms.split(",") if name.strip()]
+    native_options = {"--whole": whole, "--platforms": bool(platforms), "--co-simulation-only": co_simulation_only}
+    _refuse_mixed_kinds(for_c_hosts, native, fmi, native_options)
+    if whole:
+        _build_whole(robot, out, targets, fmi, output)
+        return
     refuse_overwriting_inputs(
         [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
     )
-    _refuse_mixed_kinds(for_c_hosts, native, platforms, fmi, co_simulation_only)
     if for_c_hosts:
         embeddable_python()
         find_compiler()
-    targets = [name.strip() for name in platforms.split(",") if name.strip()]
     with atomic_folder(out) as scratch, progress_bar(output) as progress:
         built = build_fmus(robot, scratch, partial(progress, "building"), native, targets, fmi, co_simulation_only)
         fmus = with_user_fmus_copied(built, scratch)
@@ -97,15 +106,26 @@ def build(
     output.suggest_next(f"tautwire fmus {shell_quoted(robot_file)}, for their ports; or load {paths[-1]} in your tool")
 
 
-def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str, fmi: int, co_simulation_only: bool) -> None:
+def _build_whole(robot: Robot, out: Path, targets: Sequence[str], fmi: int, output: CommandOutput) -> None:
+    """Build the one FMU of a whole robot."""
+    from ..atomic_output import atomic_folder
+    from ..fmus.packaging import build_whole_fmu
+    from ..robot.rigid_equilibrium import orientation_notes
+
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        path = out / build_whole_fmu(robot, scratch, partial(progress, "building"), targets, fmi).name
+    for note in orientation_notes(robot):
+        output.note(note)
+    output.result([path], {"fmus": {"robot": path}})
+    output.suggest_next(f"load {path} in your tool")
+
+
+def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, fmi: int, native_options: Mapping[str, bool]) -> None:
     if native and for_c_hosts:
         raise InputError("--for-c-hosts", "is given beside --native, which any program can run", "leave it out")
-    if platforms and not native:
-        raise InputError("--platforms", "is given without --native", "add --native")
-    if co_simulation_only and not native:
-        raise InputError(
-            "--co-simulation-only", "is given without --native, and others do nothing else", "leave it out"
-        )
+    for option, is_given in native_options.items():
+        if is_given and not native:
+            raise InputError(option, "is given without --native", "add --native")
     if fmi != 2 and not (native and fmi == 3):
         raise InputError("--fmi", f"is {fmi}" + ("" if native else " without --native"), "give 2, or --native --fmi 3")
 

@@ -126,7 +126,7 @@ def build_whole_fmu(
     """Write ``robot.fmu`` into ``folder``: platform, cables and winches of a robot in one native FMU.
 
     Its inputs are the winch speeds and the external load, its outputs pose, tensions and rope lengths; all states are
-    integrated together. ``platforms``, ``fmi``, ``folder`` and ``progress`` as for :func:`build_fmus`. Returns its path.
+    integrated together. The arguments are those of :func:`build_fmus`. Returns the path.
 
     Raises SlotError where the robot file names FMUs of the user, UnreachableError where the cables cannot hold the
     platform at the start, NativeBuildError where it cannot be compiled, ArgumentError where an argument is none of

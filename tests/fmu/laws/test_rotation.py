@@ -13,6 +13,7 @@ from tautwire_fmu.laws.rotation import (
     IDENTITY,
     multiply,
     quaternion_of,
+    quaternion_rate,
     rotate,
     rotate_back,
     rotation_matrix,
@@ -50,6 +51,12 @@ def test_no_rotation_is_the_identity_and_turns_at_half_the_rate_of_its_vector() 
     assert quaternion_of(REAL, (0.0, 0.0, 0.0)) == IDENTITY
     with_rates = quaternion_of(COMPLEX_STEP, tuple(with_rate(0.0, rate) for rate in VECTOR))
     assert [rate_of(part) for part in with_rates] == pytest.approx([0.0, *(0.5 * rate for rate in VECTOR)])
+
+
+def test_a_quaternion_changes_at_the_rate_of_turning_on_by_the_angular_velocity() -> None:
+    quaternion = quaternion_of(REAL, TURNS[0])
+    turned_on = multiply(quaternion, quaternion_of(COMPLEX_STEP, tuple(with_rate(0.0, rate) for rate in VECTOR)))
+    assert quaternion_rate(quaternion, VECTOR) == pytest.approx([rate_of(part) for part in turned_on], rel=1e-14)
 
 
 @pytest.mark.parametrize("angle", (0.0, *ANGLES))

@@ -19,7 +19,7 @@ from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import winch_drive
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, COMPLEX_STEP_SIZE
 from tautwire_fmu.slave import Slave
-from tests.support.effect_cases import BRANCHES, Case, same
+from tests.support.effect_cases import DELAYED, SEVERAL, Case, same
 from tests.support.effects import with_effects
 from tests.support.fmus import Hand, in_hand
 from tests.support.rigid_robots import crane_robot
@@ -27,18 +27,6 @@ from tests.support.robots import LIMITED, example, with_winch
 
 Array = NDArray[np.float64]
 
-SEVERAL = (
-    same("damping", damping=1.7e9),
-    same("sag", linear_density=0.1),
-    same("pulley", radius=0.15),
-    same("drum", eccentricity=0.02, phase=1.0, radius=0.15),
-    same("friction", coefficient=0.05),
-    same("transverse_damping", damping=40.0),
-    Case("relaxation", {}, BRANCHES),
-    same("payload", mass=20.0),
-    Case("drag", {}, {"drag_area": 5.0, "wind_x": 2.0}),
-)
-DELAYED = same("sensor_delay", tension_delay=0.023, position_delay=0.05)
 ROBOTS = {
     "plain": example("three"),
     "several": with_winch(with_effects(example("three"), *SEVERAL), LIMITED),

@@ -1,7 +1,7 @@
 """FMI variables of a whole robot: winch speeds and an external load in, pose, tensions and rope lengths out.
 
-It is one of its platform, its cables and its winches, whose states are integrated together in adaptive steps, to the
-relative tolerance of the experiment. Parameters and local variables have the name of their component in front.
+Its platform, its cables and its winches have their states integrated together in adaptive steps, to the relative
+tolerance of the experiment. Parameters and local variables have the name of their component in front.
 """
 
 from __future__ import annotations

@@ -15,10 +15,10 @@ from .robot_functions import cable_kinds, platform_start_size
 from .robot_slave import INNER_STEP, WholeRobot
 from .winch_functions import DRIVE_SIZE
 
-# rad/s: rate at which a state changes by its size, of all motions; robots vibrate near it.
+# m and rad: error scales of position and orientation; stiff ropes make newtons of micrometres.
+POSITION_SCALE, ANGLE_SCALE = 1e-4, 1e-4
+# rad/s: how fast motions change by their size; robots vibrate near it.
 MOTION_RATE = 10.0
-# rad: error scale of the orientation; at an arm of a metre it is that of a length.
-ANGLE_SCALE = 1e-3
 
 
 def robot_macros(slave: WholeRobot, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -52,15 +52,14 @@ def robot_macros(slave: WholeRobot, data: Mapping[str, Any]) -> dict[str, Any]:
     if "measured_position.x" in names:
         macros["MEASURED_POSITION"] = names.index("measured_position.x")
     for function in ("start", "action", "outputs", "derivative"):
-        macros[f"CABLE_{function.upper()}_FUNCTIONS"] = _list(
-            [f"cable_{function}_{kind}" for kind in range(len(kinds))]
-        )
+        by_kind = [f"cable_{function}_{kind}" for kind in range(len(kinds))]
+        macros[f"CABLE_{function.upper()}_FUNCTIONS"] = _list(by_kind)
     return macros
 
 
 def robot_state_scales(slave: WholeRobot, data: Mapping[str, Any]) -> list[float]:
     """Sizes of all states, in which the error of the integration counts."""
-    motion = [LENGTH_SCALE] * 3 + [LENGTH_SCALE * MOTION_RATE] * 3
+    motion = [POSITION_SCALE] * 3 + [POSITION_SCALE * MOTION_RATE] * 3
     if data["is_rigid"]:
         inertia = max(data["platform"]["inertia"][axis][axis] for axis in range(3))
         motion = [ANGLE_SCALE] * 4 + motion + [ANGLE_SCALE * MOTION_RATE * inertia] * 3
