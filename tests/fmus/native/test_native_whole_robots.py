@@ -43,6 +43,7 @@ JERK_SPEEDS[1:3, 2] = -1.5
 COMPLETE = with_winch(with_effects(example("three"), *SEVERAL, DELAYED), LIMITED)
 EVERYTHING = with_winch(with_effects(example("three"), *CASES), LIMITED)
 TURNED = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 7.0])
+ACCELERATIONS, VELOCITIES = ("acceleration", "angular_acceleration"), ("velocity", "angular_velocity")
 # Of the values' sizes, at least one; inner steps of Coulomb's and Bouc's kind sum up the more.
 SAME, SAME_WITH_HYSTERESIS = 1e-9, 5e-9
 BOTH_FMI = pytest.mark.parametrize("fmi", [2, 3])
@@ -318,6 +319,40 @@ def test_inputs_set_at_the_end_of_a_step_are_interpolated(plain: Path) -> None:
             ends.append(robot.get("position.x", "position.y", "position.z"))
     assert np.max(np.abs(np.subtract(*ends))) < 2e-6
     assert np.max(np.abs(np.subtract(*ends))) > 1e-9
+
+
+def test_external_load_and_its_rate_act_as_on_the_platform_alone(turning: Path, native_crane_fmus: RobotFmus) -> None:
+    names = [
+        f"external_{load}{rate}.{axis}" for load in ("force", "moment") for rate in ("", "_rate") for axis in "xyz"
+    ]
+    load = {name.replace(".", "__"): 10.0 + 3.0 * k for k, name in enumerate(names)}
+    shown = []
+    for path in (turning, native_crane_fmus.platform):
+        with in_hand(path) as hand:
+            hand.set(**load)
+            shown.append(hand.get(*(f"{each}.{axis}" for each in ACCELERATIONS for axis in "xyz")))
+            hand.run()
+            hand.step(0.0, 1e-4)
+            shown.append(hand.get(*(f"{each}.{axis}" for each in VELOCITIES for axis in "xyz")))
+    assert shown[0] == pytest.approx(shown[2], rel=1e-9)
+    # The cables hardly pull back in so short a step.
+    assert shown[1] == pytest.approx(shown[3], rel=1e-3)
+    assert min(map(abs, shown[0])) > 1e-3
+
+
+def test_the_error_follows_the_experiments_tolerance(plain: Path, ramp: tuple[Array, Array]) -> None:
+    errors = []
+    for tolerance in (1e-5, 1e-7, 1e-9):
+
+        def with_tolerance(hand: Hand, tolerance: float = tolerance) -> None:
+            hand.fmu.reset()
+            hand.fmu.setupExperiment(startTime=0.0, tolerance=tolerance)
+            hand.fmu.enterInitializationMode()
+
+        found = run_whole(plain, paper_robot(), CORNERS, RAMP_SPEEDS, 0.5, with_tolerance)
+        errors.append(np.max(np.abs(found[:, :3] - ramp[0])))
+    assert errors[0] < 1e-6
+    assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
 
 
 def test_derivatives_of_inputs_are_their_rates(plain: Path) -> None:
