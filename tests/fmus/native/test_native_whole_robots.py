@@ -44,8 +44,8 @@ COMPLETE = with_winch(with_effects(example("three"), *SEVERAL, DELAYED), LIMITED
 EVERYTHING = with_winch(with_effects(example("three"), *CASES), LIMITED)
 TURNED = np.array([0.0, 1.0, 2.0, 3.0, 5.0, 7.0])
 ACCELERATIONS, VELOCITIES = ("acceleration", "angular_acceleration"), ("velocity", "angular_velocity")
-# Of the values' sizes, at least one; inner steps of Coulomb's and Bouc's kind sum up the more.
-SAME, SAME_WITH_HYSTERESIS = 1e-9, 5e-9
+# Of the values' sizes, at least one; with strands that stick and slip the master's steps err more.
+SAME, SAME_WITH_HYSTERESIS = 1e-9, 2e-8
 BOTH_FMI = pytest.mark.parametrize("fmi", [2, 3])
 
 
@@ -322,10 +322,8 @@ def test_inputs_set_at_the_end_of_a_step_are_interpolated(plain: Path) -> None:
 
 
 def test_external_load_and_its_rate_act_as_on_the_platform_alone(turning: Path, native_crane_fmus: RobotFmus) -> None:
-    names = [
-        f"external_{load}{rate}.{axis}" for load in ("force", "moment") for rate in ("", "_rate") for axis in "xyz"
-    ]
-    load = {name.replace(".", "__"): 10.0 + 3.0 * k for k, name in enumerate(names)}
+    sizes = {"external_force": 10.0, "external_force_rate": 1e5, "external_moment": 20.0, "external_moment_rate": 2e5}
+    load = {f"{name}__{axis}": size * (1 + k) for name, size in sizes.items() for k, axis in enumerate("xyz")}
     shown = []
     for path in (turning, native_crane_fmus.platform):
         with in_hand(path) as hand:
