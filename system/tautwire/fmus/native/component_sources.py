@@ -181,7 +181,7 @@ def _controller(slave: Slave, data: Mapping[str, Any]) -> _Component:
 def _robot(slave: Slave, data: Mapping[str, Any]) -> _Component:
     assert isinstance(slave, WholeRobot)
     scales = robot_state_scales(slave, data)
-    c_files = ("principal_axes.c", "robot.c")
+    c_files = ("principal_axes.c", "robot.c", "robot_derivatives.c")
     return _Component(c_files, robot_macros(slave, data), robot_constants(data), scales)
 
 
