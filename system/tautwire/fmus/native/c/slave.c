@@ -236,9 +236,16 @@ static SavedState *save_state(const Slave *slave, SavedState *saved) {
   SavedState *target = saved ? saved : (SavedState *)calloc(1, sizeof *target);
   if (!target) return NULL;
   target->state = slave->state;
+  target->state.saved_phase = slave->phase;
   if (copy_delay_line(&target->delay_line, &slave->delay_line)) return target;
   if (!saved) free_saved_state(target);
   return NULL;
+}
+
+/* In model exchange an importer may roll back from an event into continuous time; a state of co-simulation has no such. */
+static void restore_phase(Slave *slave) {
+  int phase = slave->state.saved_phase;
+  if (slave->is_model_exchange && (phase == EVENTS || phase == CONTINUOUS_TIME)) slave->phase = (Phase)phase;
 }
 
 static int restore_state(Slave *slave, const SavedState *saved) {
@@ -246,6 +253,7 @@ static int restore_state(Slave *slave, const SavedState *saved) {
                         (VARIABLE_COUNT - FIRST_PARAMETER) * sizeof(double)) != 0;
   if (!copy_delay_line(&slave->delay_line, &saved->delay_line)) return STATUS_ERROR;
   slave->state = saved->state;
+  restore_phase(slave);
   slave->outputs_stale = 1;
   if (is_other) parameters_changed(slave);
   return STATUS_OK;

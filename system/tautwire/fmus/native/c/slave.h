@@ -8,6 +8,7 @@ typedef struct {
   double start_time;
   double last_instant[INSTANT_SIZE];
   int32_t has_instant;
+  int32_t saved_phase;
   int32_t has_previous_inputs;
   int32_t started;
 } State;
