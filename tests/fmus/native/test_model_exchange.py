@@ -31,7 +31,6 @@ Rates = Callable[[float, Array], Any]
 
 # Beside Python, and beside an independent simulator: m, both integrated by DOP853.
 SAME, RIG_ERROR = 1e-10, 1e-11
-EVENT_ERROR = 1e-6  # s
 TIMES = np.linspace(0.0, 0.5, 6)
 
 

@@ -25,7 +25,7 @@ from tests.support.winches import PayingOut
 
 Array = NDArray[np.float64]
 
-EVENT_ERROR = 1e-6  # s
+EVENT_ERROR = 1e-9  # s
 SPEED = 3.0  # rad/s
 RATE = 20.0  # rad/s
 DELAY = 0.023  # s
@@ -77,7 +77,7 @@ def test_a_cable_of_given_motion_falls_slack_when_its_law_says(fmi: int, tmp_pat
         assert indicator(0.0, model.states()) == pytest.approx(model.get("pull")[0])
         found = solve_ivp(rates, (0.0, 1.0), model.states(), "DOP853", rtol=1e-10, atol=1e-12, events=indicator)
         event = found.t_events[0][0]
-        assert abs(event - brentq(lambda time: law_pull(robot, time), 1e-3, 1.0, xtol=1e-10)) < EVENT_ERROR
+        assert abs(event - brentq(lambda time: law_pull(robot, time), 1e-3, 1.0, xtol=1e-12)) < EVENT_ERROR
         rates(event + 1e-3, found.y_events[0][0])
         assert model.get("pull")[0] < 0.0 == model.get("tension")[0]
 
@@ -100,7 +100,7 @@ def test_a_robot_that_pays_out_falls_slack_when_the_rig_says(tmp_path: Path) -> 
         taut = simulate(rig_of(robot), None, winches, [0.0, time], rtol=1e-12, atol=1e-13).pull[-1, 2] > 0.0
         return 1.0 if taut else -1.0
 
-    assert abs(event - brentq(is_taut, event - 1e-4, event + 1e-4, xtol=1e-8)) < EVENT_ERROR
+    assert abs(event - brentq(is_taut, event - 1e-4, event + 1e-4, xtol=1e-11)) < EVENT_ERROR
 
 
 def stepped(model: Model, rates: Callable[[float, Array], Array], end: float, step: float) -> list[tuple[float, Array]]:
