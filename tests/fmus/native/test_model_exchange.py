@@ -103,9 +103,9 @@ def outputs_of(slave: Any) -> list[str]:
 
 
 def integrated(rates: Rates, start: Array, scales: Array, times: Array = TIMES, **options: Any) -> Array:
-    """States by DOP853, (n, N)."""
+    """States by DOP853, (n, N); those of filters are a hundred-thousandth of their nominal value."""
     span = (times[0], times[-1])
-    solution = solve_ivp(rates, span, start, "DOP853", times, rtol=1e-12, atol=1e-12 * scales, **options)
+    solution = solve_ivp(rates, span, start, "DOP853", times, rtol=1e-12, atol=1e-15 * scales, **options)
     return np.asarray(solution.y)
 
 
