@@ -135,3 +135,12 @@ def test_a_rigid_platform_larger_than_its_frame_is_in_millimetres() -> None:
     heavy = replace(robot, platform=replace(robot.platform, inertia=((36.6e6, 0, 0), (0, 33.2e6, 0), (0, 0, 20.1e6))))
     (error,) = implausible_units(heavy, "robot.toml")
     assert error.where == "robot.toml: platform.inertia" and "kg mm^2" in error.hint
+
+
+@pytest.mark.parametrize(("factor", "cause"), [(1e4, "from its centre"), (1e-6, "turn on its ropes at up to")])
+def test_an_inertia_in_another_unit_is_told(factor: float, cause: str) -> None:
+    robot = example("cogiro")
+    assert robot.platform.inertia is not None and not list(implausible_units(robot, "robot.toml"))
+    inertia = tuple(tuple(factor * entry for entry in row) for row in robot.platform.inertia)
+    errors = list(implausible_units(replace(robot, platform=replace(robot.platform, inertia=inertia)), "robot.toml"))
+    assert errors[0].where == "robot.toml: platform.inertia" and cause in errors[0].problem

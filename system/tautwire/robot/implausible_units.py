@@ -112,9 +112,11 @@ def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
             yield _error(file, key_path, problem, "write it in m, if this is in mm multiply by 0.001")
     trace = sum(row[axis] for axis, row in enumerate(platform.inertia or ()))
     radius = math.sqrt(0.5 * trace / platform.mass)
-    if radius > reach:
-        problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {reach:.3g}"
-        hint = "write it in kg m^2, if this is in kg mm^2 multiply by 1e-6, in g cm^2 by 1e-7"
+    # Points may be far out on a mast; the mass of a platform lies within its frame.
+    frame = _frame_radius(robot)
+    if radius > frame:
+        problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {frame:.3g}"
+        hint = "write it in kg m^2, if this is in kg cm^2 multiply by 1e-4, in kg mm^2 by 1e-6, in g cm^2 by 1e-7"
         yield _error(file, ("platform", "inertia"), problem, hint)
 
 
@@ -151,6 +153,7 @@ def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
         hint = "compare the units of mass (kg), modulus (Pa), area (m^2) and anchors (m)"
         yield _error(file, ("platform", "mass"), problem, hint)
         return
+    yield from _rotation_errors(robot, file)
     times = [cable.damping / cable.modulus for cable in robot.cables]
     ratio = math.pi * frequency * max(times)
     if ratio > MAX_DAMPING_RATIO:
@@ -159,6 +162,26 @@ def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
             f"ratios of up to {ratio:.0f}, robots have at most {MAX_DAMPING_RATIO:.0f}"
         )
         yield _error(file, ("cable", times.index(max(times)), "damping"), problem, DAMPING_HINT)
+
+
+def _rotation_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Error for an inertia so small that the platform would turn faster on its ropes than any, by an upper bound."""
+    platform = robot.platform
+    if platform.inertia is None:
+        return
+    least = min(row[axis] for axis, row in enumerate(platform.inertia))
+    stiffness = sum(
+        cable.modulus * cable.area / length * math.dist(cable.attachment, platform.centre_of_mass) ** 2
+        for cable in robot.cables
+        if (length := math.dist(cable.anchor, platform.start)) > 0.0
+    )
+    frequency = math.sqrt(stiffness / least) / (2.0 * math.pi)
+    if frequency > MAX_FREQUENCY:
+        problem = (
+            f"of {least:.3g} kg m^2 makes the platform turn on its ropes at up to {frequency / 1e3:.3g} kHz, robots "
+            f"have at most {MAX_FREQUENCY / 1e3:g} kHz"
+        )
+        yield _error(file, ("platform", "inertia"), problem, "write it in kg m^2, about the centre of mass")
 
 
 def _error(file: str, key_path: tuple[str | int, ...], problem: str, hint: str) -> RobotFileError:

@@ -38,6 +38,7 @@ from .schema import (
     Winch,
     fmu_slots,
 )
+from .toml_hints import hint_for_line
 
 TOP_LEVEL_KEYS = (
     "name",
@@ -178,7 +179,8 @@ def _parse_robot_file(text: str, file: str) -> dict[str, Any]:
         line = int(match.group(1)) if match else text.count("\n") + 1
         column = f", column {match.group(2)}" if match else ""
         where = f"{file}: line {line}"
-        raise RobotFileError(where, f"is not TOML ({reason}{column})", "correct this line", line=line) from problem
+        hint = hint_for_line(text, line, reason)
+        raise RobotFileError(where, f"is not TOML ({reason}{column})", hint, line=line) from problem
 
 
 def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
