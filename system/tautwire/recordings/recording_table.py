@@ -15,6 +15,7 @@ from ..errors import RecordingError, UnknownColumnsError, format_value, raise_er
 from ..name_suggestions import closest_name, join_names
 from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .clock_time import ClockFormat
+from .near_names import near_name_errors
 from .number_hints import hint_for_number
 from .quaternion_columns import missing_quaternion_columns, quaternion_problem
 from .units import Number, Unit
@@ -143,6 +144,9 @@ def _missing_column_errors(
         problem = f"the orientation has no column {join_names(lacking)}, of {join_names(QUATERNION_COLUMNS)}"
         hint = "add it, declare its name in [recording.columns], or rename the others so that they are not read"
         yield RecordingError(where, problem, hint, line)
+    absent = known_columns(cable_count) - set(names) - {"time"}
+    outputs = sorted(name for name in absent if not name.startswith(WINCH_COLUMNS))
+    yield from near_name_errors(unknown_names, outputs, where, table.partition("]")[0], line)
 
 
 def require_samples(count: int, where: str) -> None:
@@ -172,6 +176,7 @@ class Row(NamedTuple):
     cells: list[str]
 
 
+MIN_PLACEHOLDER = 1e30  # what programs write for a number that is missing, as the largest one or 9.96921e36
 MAX_MAGNITUDE = 1e12  # beyond any quantity of a cable robot in SI units
 # What loggers, spreadsheets and databases write where a sensor dropped out.
 _NOT_A_NUMBER = ("nan", "NaN", "NAN", "-nan", "-NaN", "-nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND")
@@ -269,17 +274,19 @@ def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | Recor
         problem = f"is {format_value(cell)}, as {epoch} since 1970 are"
         line = f'time = {{ unit = "{epoch}" }} in [recording.columns], of a tracker in [recording.tracker.columns]'
         return _cell_error(row, name, problem, f"write time [{epoch}] in the header, or {line}")
-    return _cell_error(row, name, problem, "give it in SI units")
+    is_placeholder = abs(number) >= MIN_PLACEHOLDER
+    return _cell_error(row, name, problem, hint if is_placeholder else "give it in SI units")
 
 
 def _not_a_number(header: Header, name: str, cell: str, hint: str) -> tuple[str, str]:
     """The problem of a cell that holds no number, and the hint."""
     if name == "time" and header.clock is not None:
         return f"is {format_value(cell)}, not a time in {header.clock.style}", "write all times as the first"
-    if name == "time" and (":" in cell or cell.count("-") > 1):
+    number_hint = hint_for_number(cell, header.decimal_mark)
+    if name == "time" and any(map(str.isdigit, cell)) and (":" in cell or not number_hint):
         hint = "write seconds, hh:mm:ss, or ISO 8601 as in 2024-05-31T12:00:00.25Z"
     else:
-        hint = hint_for_number(cell, header.decimal_mark) or hint
+        hint = number_hint or hint
     return f"is {format_value(cell)}, not a number", hint
 
 
