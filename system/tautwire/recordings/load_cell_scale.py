@@ -22,6 +22,9 @@ MIN_SHARE, MIN_SIGMAS = 0.03, 4.0
 GAIN_DEVIATION, ANGLE_DEVIATION = 0.005, 0.002
 # Rms of the forces that are not balanced, with a cause over that without.
 MAX_RESIDUAL_SHARE = 0.5
+# Beyond them a cause is no effect: of gains, and of a payload by the platform's mass. A share that is farther off is
+# told for whatever cause.
+GAINS, MIN_PAYLOAD_SHARE, MAX_UNEXPLAINED = (0.25, 4.0), -0.75, 0.5
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class LoadCellScale:
 
 
 def load_cell_scale(robot: Robot, recording: Recording) -> LoadCellScale | None:
-    """What all load cells have in common that is off, significantly against the declared uncertainties; None else.
+    """What all load cells have in common that is off, significantly against declared uncertainties; None else.
 
     Least squares of the forces that tensions lack, block by block, on those of the tensions, of one newton in each rope
     and of the weight.
@@ -60,7 +63,9 @@ def load_cell_scale(robot: Robot, recording: Recording) -> LoadCellScale | None:
         _balancing(forces - balance.required, shape)
         for shape in (forces, balance.directions.sum(axis=2), balance.required)
     )
-    if gain is None and offset is None and payload is None:
+    gain = None if gain is None or not GAINS[0] < 1.0 / max(1.0 - gain, 1e-9) < GAINS[1] else gain
+    payload = None if payload is None or payload < MIN_PAYLOAD_SHARE else payload
+    if gain is None and offset is None and payload is None and abs(carried - 1.0) <= MAX_UNEXPLAINED:
         return None
     return LoadCellScale(
         carried,

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import static_tensions
 from .alternative_readings import Mistake, convert
-from .column_corrections import ColumnCorrection
+from .column_corrections import ColumnCorrection, scaled
 from .mistaken_motion import MIN_IMPROVEMENT
 from .recording import Recording
 from .weight_balance import FORCE_UNITS, ForceBalance
@@ -24,16 +24,24 @@ MIN_MISFIT, MAX_CORRECTED_MISFIT = 0.05, 0.3
 # By what a payload may multiply all tensions.
 MASS_RATIOS = (0.25, 10.0)
 POUND, MAX_POUND_ERROR = 0.45359237, 0.03  # kg
-# Share of the static tension below which a tared cell begins, and the time over which that is averaged.
-MAX_TARED_SHARE, TARED_DURATION = 0.03, 0.1
+# What a tared cell begins below, of the static tension and of its own deviations, averaged over the time in s.
+MAX_TARED_SHARE, MAX_TARED_DEVIATIONS, TARED_DURATION = 0.03, 0.5, 0.1
+# Of one cell to the others: gains of cells differ by less. How far a cell may be off its unit, whatever a payload does.
+CELL_RATIOS, MAX_UNIT_RATIO = (0.25, 4.0), 1.1
+# Readings that leave no more than this times the least explain the forces as well.
+EQUAL_RATIO, EQUAL_DIFFERENCE = 1.5, 0.005
 
 
 @dataclass(frozen=True)
 class CellReading:
-    """A reading of the load cells: the misfit of forces that it leaves, and what was written otherwise."""
+    """A reading of the load cells: the misfit of forces that it leaves, and what was written otherwise.
+
+    ``freedom`` counts the numbers that were fitted beside the first mistake.
+    """
 
     misfit: float
     mistake: Mistake
+    freedom: int = 0
 
 
 def likely_cell_readings(robot: Robot, recording: Recording, balance: ForceBalance) -> tuple[CellReading, ...]:
@@ -43,7 +51,10 @@ def likely_cell_readings(robot: Robot, recording: Recording, balance: ForceBalan
         return ()
     limit = min(MAX_CORRECTED_MISFIT, misfit / MIN_IMPROVEMENT)
     readings = [*_tared(robot, recording, balance), *_of_one_cell(balance), *_of_one_factor(balance)]
-    return tuple(sorted((each for each in readings if each.misfit <= limit), key=lambda each: each.misfit)[:1])
+    readings = [each for each in (*readings, *_of_two_factors(balance)) if each.misfit <= limit]
+    best = EQUAL_RATIO * min((each.misfit for each in readings), default=0.0) + EQUAL_DIFFERENCE
+    equal = [each for each in readings if each.misfit <= best]
+    return tuple(sorted(equal, key=lambda each: (each.freedom, each.misfit))[:1])
 
 
 def _misfit(balance: ForceBalance, factors: Array, offsets: Array | float = 0.0) -> float:
@@ -84,8 +95,50 @@ def _of_one_factor(balance: ForceBalance) -> Iterator[CellReading]:
         yield CellReading(_misfit(balance, np.full(count, factor)), mistake)
 
 
+def _of_two_factors(balance: ForceBalance) -> Iterator[CellReading]:
+    """One cell of the other sign or by a factor of its own, beside others that may be in another unit."""
+    cells = np.flatnonzero(balance.has_load_cell)
+    pulls = np.einsum("bci,bi->bci", balance.directions, balance.tensions)
+    for cell in cells if len(cells) > 1 else ():
+        own, others = pulls[:, :, cell].ravel(), np.delete(pulls, cell, axis=2).sum(axis=2).ravel()
+        common, factor = np.linalg.lstsq(np.column_stack([others, own]), balance.required.ravel(), rcond=None)[0]
+        unit = _unit_of(common)
+        if unit is None or common < 0.0 or CELL_RATIOS[0] < factor / common < CELL_RATIOS[1]:
+            continue
+        factors = np.full(len(balance.has_load_cell), FORCE_UNITS[unit])
+        factors[cell] = sign = -FORCE_UNITS[unit] if _unit_of(-factor) == unit else factor
+        yield CellReading(_misfit(balance, factors), _mistake_of_two(balance, int(cell), unit, float(sign)), freedom=1)
+
+
+def _unit_of(factor: float) -> str | None:
+    """The nearest unit, None where none is near."""
+    unit = min(FORCE_UNITS, key=lambda symbol: abs(np.log(max(factor, 1e-300) / FORCE_UNITS[symbol])))
+    return unit if 1.0 / MAX_UNIT_RATIO < factor / FORCE_UNITS[unit] < MAX_UNIT_RATIO else None
+
+
+def _unit_text(unit: str) -> str:
+    """The unit, with the other one that is as large but for what a small payload makes of it."""
+    return {"kg": "kg or daN", "daN": "daN or kg"}.get(unit, unit)
+
+
+def _mistake_of_two(balance: ForceBalance, cell: int, unit: str, factor: float) -> Mistake:
+    """The mistake of a cell with a factor in N, beside others in a unit."""
+    name, size = f"tension_{cell + 1}", FORCE_UNITS[unit]
+    others = [f"tension_{index + 1}" for index, has in enumerate(balance.has_load_cell) if has and index != cell]
+    corrections = [*scaled(others, size, unit)] if unit != "N" else []
+    causes = [f"{', '.join(others)} are in {_unit_text(unit)}"] if unit != "N" else []
+    if factor == -size:
+        causes.append(f"{name} {'is too, and ' if causes else 'alone '}has the other sign")
+        corrections.append(ColumnCorrection(name, unit=unit if unit != "N" else "", factor=size, sign=-1.0))
+        return Mistake(" and ".join(causes), convert(name, factor), tuple(corrections))
+    causes.append(f"1 of {name} alone is about {factor:.3g} N, as of another amplifier or converter than the others'")
+    corrections.append(ColumnCorrection(name, factor=float(f"{abs(factor):.4g}"), sign=float(np.sign(factor))))
+    remedy = f"{convert(name, factor)}, or better by the factor of its calibration"
+    return Mistake(" and ".join(causes), remedy, tuple(corrections))
+
+
 def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterator[CellReading]:
-    """Cells, one or all of them, that begin at zero under the static tension."""
+    """Cells, one or all of them, that begin at zero under the static tension, in newtons or another unit."""
     try:
         static = np.array(static_tensions(robot))
     except InputError:
@@ -97,16 +150,28 @@ def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterato
     begin = np.array(
         [np.nanmean(column) if has else np.inf for column, has in zip(start.T, has_load_cell, strict=True)]
     )
-    is_tared = np.abs(begin) <= MAX_TARED_SHARE * static
-    if not is_tared.any():
-        return
-    cells = np.flatnonzero(is_tared)
+    moved = np.nanstd(recording.tension, axis=0, where=np.isfinite(recording.tension))
+    readings = []
+    for unit, size in FORCE_UNITS.items():
+        is_small = np.abs(begin) <= np.minimum(MAX_TARED_SHARE * static / size, MAX_TARED_DEVIATIONS * moved)
+        if is_small.any() and (unit == "N" or is_small[has_load_cell].all()):
+            factors, offsets = np.full(len(static), size), np.where(is_small, static, 0.0)
+            mistake = _mistake_of_taring(np.flatnonzero(is_small), static, unit)
+            readings.append(CellReading(_misfit(balance, factors, offsets), mistake, freedom=int(unit != "N")))
+    yield from readings
+
+
+def _mistake_of_taring(cells: NDArray[np.int64], static: Array, unit: str) -> Mistake:
+    """The mistake of cells that were tared under the static tensions (n,) in N, and are in a unit."""
     names = ", ".join(f"tension_{cell + 1}" for cell in cells)
     texts = [f"{value:.4g}" for value in static[cells]]
-    corrections = tuple(ColumnCorrection(f"tension_{cell + 1}", shift=float(static[cell])) for cell in cells)
-    mistake = Mistake(
-        f"{names} {'were' if len(cells) > 1 else 'was'} tared at the start, where statics gives {', '.join(texts)} N",
-        "add that, or tare without load",
-        corrections,
+    own, size = (unit if unit != "N" else ""), FORCE_UNITS[unit]
+    corrections = tuple(
+        ColumnCorrection(f"tension_{cell + 1}", unit=own, factor=size, shift=float(static[cell])) for cell in cells
     )
-    yield CellReading(_misfit(balance, np.ones(len(static)), np.where(is_tared, static, 0.0)), mistake)
+    cause = (
+        f"{names} {'were' if len(cells) > 1 else 'was'} tared at the start, where statics gives {', '.join(texts)} N"
+    )
+    return Mistake(
+        cause + (f", and are in {_unit_text(unit)}" if own else ""), "add that, or tare without load", corrections
+    )
