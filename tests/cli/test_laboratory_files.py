@@ -250,6 +250,46 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     "one sample": (lambda frame: text_of(frame.iloc[:1]), "has 1 sample, must have at least 2"),
     "nothing": (lambda frame: "", "is empty"),
     "a workbook": (lambda frame: b"PK\x03\x04" + bytes(100), "a zip archive or a spreadsheet, not text"),
+    "winches that stand while the platform moves": (
+        lambda f: text_of(f.assign(**dict.fromkeys(SPEEDS, 0.0))),
+        "all winches stand, and by the positions ropes change in length by up to ",
+    ),
+    "positions in mm beside a gap": (
+        lambda f: text_of(f.assign(**{axis: 1e3 * f[axis] for axis in AXES}).drop(index=range(150, 300))),
+        "x, y, z are in mm",
+    ),
+    "names in capitals, with a unit": (
+        lambda f: text_of(
+            f.assign(**{a: 1e3 * f[a] for a in AXES}).rename(columns={a: f"{a.upper()} [mm]" for a in AXES})
+        ),
+        'write into [recording.columns] x = { name = "X [mm]", unit = "mm" }',
+    ),
+    "a unit at the end of a name": (
+        lambda f: text_of(f.assign(**{c: 1e-3 * f[c] for c in CELLS}).rename(columns={c: f"{c}_kN" for c in CELLS})),
+        "the column 'tension_2_kN' is not read, and tension_2 is missing",
+    ),
+    "the largest number where nothing was measured": (
+        lambda f: text_of(f.assign(z=f.z.where(f.index % 50 > 0, 1.7e308))),
+        "or leave the cell of an output empty where nothing was measured",
+    ),
+    "times of a controller": (
+        lambda f: text_of(f.assign(time=[f"T#{round(1e3 * t)}ms" for t in f.time])),
+        "write seconds, hh:mm:ss, or ISO 8601",
+    ),
+    "load cells in kN that were tared under load": (
+        lambda f: text_of(f.assign(**{cell: 1e-3 * (f[cell] - f[cell][:10].mean()) for cell in CELLS})),
+        "N, and are in kN",
+    ),
+    "load cells in kg, one of the other sign": (
+        lambda f: text_of(f.assign(**{c: f[c] / (-9.80665 if c == CELLS[0] else 9.80665) for c in CELLS})),
+        "tension_1 is too, and has the other sign",
+    ),
+    "one load cell in volts": (scaled(CELLS[2:], 0.0123), "1 of tension_3 alone is about 81.3 N"),
+    "one drum in rpm": (
+        scaled(SPEEDS[:1], 95.5),
+        "winch_speed_1 is no speed of a rope in m/s: 1 of it is 0.0105 m/s, ",
+    ),
+    "one speed in half, of the other sign": (scaled(SPEEDS[:1], -2.0), "and winch_speed_1 has the other sign"),
     "another robot": (
         lambda frame: text_of(pd.read_csv(EXAMPLES / "caroca" / "fit.csv", nrows=ROWS)),
         "does not match the positions",
@@ -319,6 +359,25 @@ def test_an_encoder_whose_range_ends_is_read_on_and_told(tmp_path: Path) -> None
     assert checked.recording is not None
     speed, expected = checked.recording.winch_speed, frame[SPEEDS].to_numpy()
     assert np.sqrt(np.mean((speed - expected) ** 2)) < 0.02 * np.sqrt(np.mean(expected**2))
+
+
+def test_the_motion_of_winches_in_a_gap_is_not_held_against_positions(tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard().drop(index=range(150, 450))
+    checked = check_files(laboratory.robot(ROBOT), laboratory.recording(text_of(frame)))
+    assert checked.problems == () and any("the winch motion in its gaps" in note for note in checked.notes)
+    assert not any("winch travel is off the recorded positions" in note for note in checked.notes)
+
+
+@pytest.mark.parametrize("file", ["names in capitals, with a unit", "a unit at the end of a name"])
+def test_the_line_that_is_told_for_a_name_reads_it(file: str, tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    hints = laboratory.problems(str(REFUSED[file][0](frame)))
+    lines = [hint.partition("[recording.columns] ")[2].partition(", or rename")[0] for hint in hints]
+    robot = laboratory.robot("\n".join([ROBOT, "[recording.columns]", *lines, ""]))
+    checked = check_files(robot, tmp_path / "log.csv")
+    assert checked.problems == () and checked.recording is not None
+    assert checked.recording.position == pytest.approx(frame[AXES].to_numpy(), rel=1e-12)
+    assert checked.recording.tension == pytest.approx(frame[CELLS].to_numpy(), rel=1e-12)
 
 
 @pytest.mark.parametrize("file", REFUSED)

@@ -223,3 +223,20 @@ def test_drums_of_a_measured_robot_are_told(which: str) -> None:
         each for each in check_files(folder / "robot.toml", folder / f"{which}.csv").notes if "rope moves" in each
     )
     assert numbers(note)[:4] == pytest.approx([0.9415, 0.9363, 0.9432, 0.9390], abs=5e-3)
+
+
+def test_what_no_drum_does_is_no_scale() -> None:
+    """Of positions in reverse, and of a tracker that shows one position."""
+    robot, recording = example("cogiro"), read_recording(EXAMPLES / "cogiro" / "fit.csv", 8)
+    reverse = replace(recording, position=recording.position[::-1], orientation=recording.orientation[::-1])
+    (note,) = (each for each in recording_notes(robot, reverse) if "tensions carry" not in each)
+    assert "winch travel is off the recorded positions by 166 %" in note
+    still = replace(recording, position=np.tile(recording.position[0], (recording.sample_count, 1)))
+    assert all("tensions carry" in note for note in recording_notes(robot, still))
+
+
+def test_load_cells_that_carry_hardly_anything_have_no_payload() -> None:
+    robot, recording = example("eight"), read_recording(EXAMPLES / "eight" / "fit.csv", 8)
+    signs = np.where(np.arange(8) % 2, 1.0, -0.8)
+    (note,) = recording_notes(robot, replace(recording, tension=signs * recording.tension))
+    assert "no unit, sign, order, zero or gain that was tried explains it" in note and "payload" not in note

@@ -99,7 +99,7 @@ class WindingReading:
             yield Mistake(f"time is in {unit}", convert("time", factor), scaled(("time",), factor, unit))
         if self.speed_unit is None:
             yield Mistake(
-                _factor_text(names, self.radius, bool(recording.rope_lengths)),
+                factor_text(names, self.radius, bool(recording.rope_lengths)),
                 f"multiply {_range_text(names)} by {self.radius:.4g}, or better by the factor that follows from the "
                 "drum's radius and what is recorded in one turn of it",
                 scaled(names, float(f"{self.radius:.6g}")),
@@ -156,7 +156,7 @@ def likely_drum_radii(ratio: float) -> dict[str, float]:
     return {unit: radius for unit, radius in by_unit.items() if DRUM_RADII[0] <= radius <= DRUM_RADII[1]}
 
 
-def _factor_text(names: list[str], ratio: float, are_lengths: bool) -> str:
+def factor_text(names: list[str], ratio: float, are_lengths: bool) -> str:
     """What columns are one of whose units is ``ratio`` m of rope, or m/s: angles, or counts."""
     radii = likely_drum_radii(ratio)
     if are_lengths:
@@ -166,12 +166,14 @@ def _factor_text(names: list[str], ratio: float, are_lengths: bool) -> str:
     near = min(SPEED_UNITS, key=lambda symbol: abs(ratio / SPEED_UNITS[symbol] - 1.0))
     error = ratio / SPEED_UNITS[near] - 1.0
     near = near.removesuffix("/s") if are_lengths else near
-    parts = [f"1 of theirs is {ratio:.4g} {unit}"]
+    parts = [f"1 of {'theirs' if len(names) > 1 else 'it'} is {ratio:.4g} {unit}"]
     parts += (
         [f"{100.0 * abs(error):.2g} % {'more' if error > 0.0 else 'less'} than one {near}"] if abs(error) < 0.1 else []
     )
     is_gear = 1.0 / MAX_DRUM_RATIO < ratio < MAX_DRUM_RATIO
     causes = [f"as of angles of drums with a radius of {likely}"] if likely else []
     causes += [f"as of gears, drums or intervals of time {ratio:.3g} times those that were taken"] if is_gear else []
-    parts += [" or ".join(causes) if causes else "as of an encoder's counts"]
-    return f"{_range_text(names)} are not {kind} of ropes in {unit}: {', '.join(parts)}"
+    causes = causes or ["as of an encoder's counts" if ratio < 1.0 else "as of a gear or another unit"]
+    parts += [" or ".join(causes)]
+    is_no = f"is no {kind.removesuffix('s')} of a rope" if len(names) == 1 else f"are not {kind} of ropes"
+    return f"{_range_text(names)} {is_no} in {unit}: {', '.join(parts)}"

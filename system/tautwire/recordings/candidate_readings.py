@@ -24,6 +24,7 @@ MAX_RATIO_SPREAD = 0.03
 GIVING_ROPES = (0.5, 4.0)
 # Beyond the ratio it is a gear's if it leaves this share of what is missed at most.
 MIN_GEAR_RATIO, MAX_GEAR_SHARE = 1.25, 0.1
+PLANE = 2  # axes, of which one in another unit is the other one in that of both
 LONG_TIME_UNITS = ("min", "h", "d")
 SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 
@@ -34,12 +35,14 @@ def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
     Of rigid platforms also other poses, and attachments in another unit.
     """
     for axes, signs in signed_axes():
-        for unit in LENGTH_UNITS:
+        # A coordinate across the plane is not read, whatever its sign.
+        is_other = any(sign < 0 for axis, sign in enumerate(signs) if axis not in robot.axes_in_plane)
+        for unit in () if is_other else LENGTH_UNITS:
             yield GeometryReading(unit, "m", axes, signs)
     for unit in ANCHOR_UNITS[1:]:
         yield GeometryReading(anchor_unit=unit)
     for unit, odd_axis, odd_unit in product(LENGTH_UNITS, robot.axes_in_plane, LENGTH_UNITS):
-        if unit != odd_unit:
+        if unit != odd_unit and (unit == "m" or len(robot.axes_in_plane) > PLANE):
             yield GeometryReading(unit, odd_axis=odd_axis, odd_unit=odd_unit)
     if robot.platform.is_rigid_body:
         for unit in ATTACHMENT_UNITS:

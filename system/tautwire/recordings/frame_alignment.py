@@ -12,16 +12,17 @@ from scipy.spatial.transform import Rotation
 
 from ..robot.schema import AXES, Robot
 from .alternative_readings import LENGTH_UNITS
-from .geometry_reading import GeometryReading, RecordedPoses, signed_axes
+from .geometry_reading import IDENTITY, GeometryReading, RecordedPoses, signed_axes
 
 Array = NDArray[np.float64]
 
 ROWS_USED, NEWTON_STEPS = 200, 30
 # Singular values of positions over the largest: below it they are on a line, or in a plane.
 MIN_SINGULAR_RATIO = 0.02
-MAX_SCALE_ERROR = 0.05
+MAX_SCALE_ERROR = 0.1
 # Axes that are nearer to those of the robot file, or to others of the tracker, are these.
 MAX_AXES_ERROR = np.radians(3.0)
+WORLD_UNITS = ("m", "mm")
 INSIDE_PULLEY = 1e6  # m, an error of lengths where a position has none
 
 
@@ -30,14 +31,17 @@ def aligned_frames(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator
 
     Positions by forward kinematics from the declared start give unit, axes and rotation by Procrustes analysis
     (Umeyama 1991); the origin, and a rotation that is none of the axes alone, then fit the lengths. First with the axes
-    as they are, then as they fit, which of a rigid platform is not tried. None along a line, of no unit, or where a
-    coordinate in the robot's plane is missing.
+    as they are, then as they fit; of a rigid platform worlds in which it begins turned as declared. None along a line,
+    of no unit, or where a coordinate in the robot's plane is missing.
     """
     rows = slice(None, None, max(1, len(wound) // ROWS_USED))
     poses, wound = RecordedPoses(poses.position[rows], poses.orientation[rows]), wound[rows]
     yield _with_fitted_frame(robot, GeometryReading(), poses, wound, is_turned=False)
     recorded, in_plane = poses.position, list(robot.axes_in_plane)
-    if robot.platform.is_rigid_body or not np.isfinite(recorded[:, in_plane]).all():
+    if robot.platform.is_rigid_body:
+        yield from _turned_worlds(robot, poses, wound)
+        return
+    if not np.isfinite(recorded[:, in_plane]).all():
         return
     scale, axes = _procrustes(recorded[:, in_plane], forward_kinematics_of_travel(robot, wound)[:, in_plane])
     unit = min(LENGTH_UNITS, key=lambda symbol: abs(np.log(max(scale, 1e-300) / LENGTH_UNITS[symbol])))
@@ -46,7 +50,28 @@ def aligned_frames(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator
     turned = np.eye(len(AXES))
     turned[np.ix_(in_plane, in_plane)] = axes
     geometry, error = _nearest_axes(turned, unit)
+    geometry = geometry if error > MAX_AXES_ERROR else replace(geometry, rotation=IDENTITY)
     yield _with_fitted_frame(robot, geometry, poses, wound, is_turned=error > MAX_AXES_ERROR)
+
+
+def _turned_worlds(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator[GeometryReading]:
+    """Worlds turned against the robot file's, in which a rigid platform begins as declared: along axes, or as fits."""
+    if not np.isfinite(poses.orientation[0]).all() or not np.isfinite(poses.position).all():
+        return
+    declared, shown = (
+        Rotation.from_quat(np.asarray(quaternion)[[1, 2, 3, 0]])
+        for quaternion in (robot.platform.start_orientation, poses.orientation[0])
+    )
+    turn = (declared * shown.inv()).as_matrix()
+    axes, error = _nearest_axes(turn, "m")
+    along_axes = np.eye(len(AXES))[list(axes.axes)] * np.array(axes.signs)[:, None]
+    is_turned = error > MAX_AXES_ERROR
+    matrix = turn if is_turned else along_axes
+    if np.allclose(matrix, np.eye(len(AXES))):
+        return
+    for unit in WORLD_UNITS:
+        geometry = GeometryReading(unit, rotation=tuple(tuple(row) for row in matrix.tolist()))
+        yield _with_fitted_frame(robot, geometry, poses, wound, is_turned)
 
 
 def forward_kinematics_of_travel(robot: Robot, wound: Array) -> Array:
@@ -106,8 +131,9 @@ def _with_fitted_frame(
     def frame(parameters: Array) -> GeometryReading:
         origin, vector = np.zeros(len(AXES)), turned.copy()
         origin[axes], vector[free] = parameters[: len(axes)], parameters[len(axes) :]
-        matrix = Rotation.from_rotvec(vector).as_matrix() if is_turned else np.eye(len(AXES))
-        rotation = tuple(tuple(row) for row in matrix.tolist())
+        rotation = geometry.rotation
+        if is_turned:
+            rotation = tuple(tuple(row) for row in Rotation.from_rotvec(vector).as_matrix().tolist())
         return replace(geometry, origin=tuple(origin.tolist()), rotation=rotation)
 
     def errors(parameters: Array) -> Array:

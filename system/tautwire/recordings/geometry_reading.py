@@ -191,7 +191,7 @@ class GeometryReading:
             yield Mistake(f"the robot file's x, y, z are the recording's {names}", remedy, corrections)
         offset = ", ".join(f"{coordinate:.3g}" for coordinate in self.origin)
         if self.rotation != IDENTITY:
-            yield self._turned_frame(offset)
+            yield self._turned_frame(offset, has_orientation)
         elif any(self.origin):
             cause = f"x, y, z have another origin, about [{offset}] m in the robot file's frame"
             shifts = zip(AXES, self.origin, strict=True)
@@ -212,12 +212,20 @@ class GeometryReading:
             if (axis, handedness * sign) != (index, 1.0)
         )
 
-    def _turned_frame(self, offset: str) -> Mistake:
+    def _turned_frame(self, offset: str, has_orientation: bool) -> Mistake:
         angle = np.degrees(np.arccos(np.clip((np.trace(self.rotation) - 1.0) / 2.0, -1.0, 1.0)))
-        rows = ", ".join("[" + ", ".join(f"{entry:.4g}" for entry in row) + "]" for row in self.rotation)
+        rows = ", ".join("[" + ", ".join(f"{entry + 0.0:.4g}" for entry in row) + "]" for row in self.rotation)
+        quaternion = ""
+        if has_orientation:
+            parts = ", ".join(
+                f"{part + 0.0:.4g}" for part in Rotation.from_matrix(self.rotation).as_quat()[[3, 0, 1, 2]]
+            )
+            quaternion = f", and the product of quaternions ({parts}) (qw, qx, qy, qz) as qw, qx, qy, qz"
         return Mistake(
-            f"x, y, z are in a frame that is turned by about {angle:.3g} degrees, with its origin at [{offset}] m",
-            f"write R (x, y, z) + [{offset}] as x, y, z, in m, with R = [{rows}] or what a survey of the tracker says",
+            f"{'poses' if has_orientation else 'x, y, z'} are in a frame that is turned by about {angle:.3g} degrees, "
+            f"with its origin at [{offset}] m",
+            f"write R (x, y, z) + [{offset}] as x, y, z, in m, with R = [{rows}] or what a survey of the tracker says"
+            f"{quaternion}",
         )
 
 

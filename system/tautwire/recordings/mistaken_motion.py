@@ -35,6 +35,8 @@ EQUAL_RATIO, EQUAL_DIFFERENCE = 1.5, 0.005
 MIN_START_SHARE = 0.02
 # Of anchors that lie in a frame of their own, in which the start says nothing: with it at most, and at least without.
 MAX_FRAME_MISFIT, MIN_FRAME_MISFIT = 0.01, 0.2
+# Of frames that bring the start nearer where much is missed, beside drums that are off by as much.
+MAX_FAR_MISFIT = 0.08
 MIN_CLOCK_OFFSET, MAX_CLOCK_OFFSET = 0.5, 10.0  # s
 
 
@@ -140,7 +142,8 @@ def _check_as_read(robot: Robot, recording: Recording) -> MotionCheck | None:
         readings += [_reading(GeometryReading(), winding, error, recording) for winding, error in clocks]
         frames = aligned_frames(robot, motion.poses, motion.wound)
         framed = [_declared_reading(motion, frame) for frame in frames]
-        readings += [each for each in framed if each.misfit <= MAX_MISFIT and _is_start_nearer(motion, each.geometry)]
+        limit = MAX_MISFIT if misfit < MIN_FRAME_MISFIT else MAX_FAR_MISFIT
+        readings += [each for each in framed if each.misfit <= limit and _is_start_nearer(motion, each.geometry)]
         is_far = misfit >= MIN_FRAME_MISFIT and moves_along_two_axes(motion.ropes(GeometryReading()).lengths)
         if is_far and not any(each.misfit <= MAX_FRAME_MISFIT for each in readings):
             readings += [each for each in framed if each.misfit <= MAX_FRAME_MISFIT]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,8 @@ MIN_SECOND_MOTION = 0.05  # of singular values of motion, to the largest
 MAX_ROWS, ROWS_USED, MIN_ROWS = 8000, 1000, 10
 # Quantile of rows that count: the others may be outliers.
 INLIER_QUANTILE = 0.95
+# Of the median interval: what a winch does in a longer one is unknown.
+MAX_GAP_INTERVALS = 5.0
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ def wound_lengths_in(rows: NDArray[np.int64], recording: Recording) -> Array:
 
 
 def moving_rows(robot: Robot, recording: Recording) -> NDArray[np.int64] | None:
-    """Rows with poses, evenly spaced in the stretch where winches move most; None where nothing moves.
+    """Rows with poses, evenly spaced in the stretch without gaps where winches move most; None where none do.
 
     None too where a rigid platform's orientation was not recorded, without which ropes have no known lengths.
     """
@@ -118,16 +121,24 @@ def moving_rows(robot: Robot, recording: Recording) -> NDArray[np.int64] | None:
     if np.count_nonzero(measured) < len(robot.axes_in_plane):
         return None
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(wound, axis=0)).sum(axis=1))])
-    first = 0
-    if recording.sample_count > MAX_ROWS:
-        first = int(np.argmax(travel[MAX_ROWS:] - travel[:-MAX_ROWS]))
-    stretch = np.arange(first, min(first + MAX_ROWS, recording.sample_count))
+    begin, end = max(gapless_parts(recording.time), key=lambda part: travel[part[1] - 1] - travel[part[0]])
+    first = begin
+    if end - begin > MAX_ROWS:
+        first += int(np.argmax(travel[begin + MAX_ROWS : end] - travel[begin : end - MAX_ROWS]))
+    stretch = np.arange(first, min(first + MAX_ROWS, end))
     rows = stretch[np.isfinite(pose[stretch][:, measured]).all(axis=1)]
     if rows.size < MIN_ROWS or not (
         _moves(recording.position, rows) or (is_rigid and _moves(recording.orientation, rows))
     ):
         return None
     return rows[:: max(1, rows.size // ROWS_USED)]
+
+
+def gapless_parts(time: Array) -> list[tuple[int, int]]:
+    """First row and end of each part of times (N,) between gaps."""
+    steps = np.diff(time)
+    edges = [0, *(np.flatnonzero(steps > MAX_GAP_INTERVALS * np.median(steps)) + 1).tolist(), len(time)]
+    return list(pairwise(edges))
 
 
 def moves_along_two_axes(lengths: Array) -> bool:

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..robot.schema import Robot
-from .alternative_readings import LENGTH_UNITS, SPEED_UNITS, Mistake, convert, mistakes_text
-from .column_corrections import scaled
+from .alternative_readings import LENGTH_UNITS, SPEED_UNITS, Mistake, convert, factor_text, mistakes_text
+from .column_corrections import ColumnCorrection, scaled
 from .geometry_reading import GeometryReading, recorded_poses
-from .motion_regression import centred, moving_rows
+from .motion_regression import centred, gapless_parts, moving_rows
 from .recording import Recording
 
 Array = NDArray[np.float64]
@@ -29,9 +28,10 @@ INLIER_QUANTILE = 0.95
 # A cause leaves at most this share of the misfit, and of the cable's motion.
 MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
 MAX_MOVED = 2.0  # of an exit point's distance from the start
-MAX_GAP_INTERVALS = 5.0
 DRUM_SCALES = (0.7, 1.4)
-MIN_HELD_SAMPLES, MIN_TAUT_SHARE = 20, 0.2
+# Of a unit that is written otherwise, and of drums; what is farther off is an angle or a count.
+MAX_UNIT_ERROR, WINCH_RATIOS = 0.03, (0.25, 4.0)
+MIN_HELD_SAMPLES, MIN_TAUT_SHARE, MAX_STILL = 20, 0.2, 1e-6
 # Of samples, and of the rope's speed to the one that is recorded in them.
 MIN_CLIPPED_SHARE, MIN_CLIPPED_RATIO = 0.03, 1.2
 SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
@@ -113,9 +113,7 @@ def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
 
 
 def _longest_part(recording: Recording) -> Recording:
-    steps = np.diff(recording.time)
-    edges = [0, *(np.flatnonzero(steps > MAX_GAP_INTERVALS * np.median(steps)) + 1), recording.sample_count]
-    return recording.part(*max(pairwise(edges), key=lambda rows: rows[1] - rows[0]))
+    return recording.part(*max(gapless_parts(recording.time), key=lambda rows: rows[1] - rows[0]))
 
 
 def _fault(travel: _Travel, cable: int) -> Texts | None:
@@ -125,14 +123,24 @@ def _fault(travel: _Travel, cable: int) -> Texts | None:
 
 
 def _other_unit(travel: _Travel, cable: int) -> Texts | None:
-    """A unit in which a rope's length follows its winch."""
+    """A unit, or a factor that no drum is off by, with which a rope's length follows its winch."""
     length, wound, name = travel.lengths[:, cable], travel.wound[:, cable], travel.column(cable)
+    energy = float(wound @ wound)
+    ratio = -float(length @ wound) / energy if energy > 0.0 else 1.0
     for unit, size in (LENGTH_UNITS if travel.is_length(cable) else SPEED_UNITS).items():
         left = float(np.sqrt(np.mean((length + size * wound) ** 2))) / travel.motion[cable]
-        if size != 1.0 and _is_explained(left, travel.misfit(cable)):
+        if size != 1.0 and _is_explained(left, travel.misfit(cable)) and abs(ratio / size - 1.0) <= MAX_UNIT_ERROR:
             mistake = Mistake(f"{name} is in {unit}", convert(name, size), scaled((name,), size, unit))
             return mistakes_text([[mistake]], travel.recording)
-    return None
+    left = float(np.sqrt(np.mean((length + ratio * wound) ** 2))) / travel.motion[cable]
+    if WINCH_RATIOS[0] < ratio < WINCH_RATIOS[1] or not _is_explained(left, travel.misfit(cable)):
+        return None
+    cause = factor_text([name], abs(ratio), travel.is_length(cable))
+    sign = -1.0 if ratio < 0.0 else 1.0
+    cause += f", and {name} has the other sign" if sign < 0.0 else ""
+    better = "or better by the factor that follows from the drum's radius and what is recorded in one turn of it"
+    correction = ColumnCorrection(name, factor=float(f"{abs(ratio):.6g}"), sign=sign)
+    return mistakes_text([[Mistake(cause, f"{convert(name, ratio)}, {better}", (correction,))]], travel.recording)
 
 
 def _copied(travel: _Travel, cable: int) -> Texts | None:
@@ -140,7 +148,8 @@ def _copied(travel: _Travel, cable: int) -> Texts | None:
     speeds, name = travel.recording.winch_speed, travel.column(cable)
     for other in range(speeds.shape[1]):
         differ = np.sqrt(np.mean((travel.lengths[:, cable] - travel.lengths[:, other]) ** 2))
-        if differ > MAX_MISFIT * travel.motion[cable] and np.array_equal(speeds[:, cable], speeds[:, other]):
+        is_copy = np.array_equal(speeds[:, cable], speeds[:, other]) and np.ptp(speeds[:, cable]) > 0.0
+        if is_copy and differ > MAX_MISFIT * travel.motion[cable]:
             return f"{name} repeats {travel.column(other)}", f"record {name}"
     return None
 
@@ -148,6 +157,8 @@ def _copied(travel: _Travel, cable: int) -> Texts | None:
 def _held(travel: _Travel, cable: int) -> Texts | None:
     """One speed for long while a taut rope's length changes otherwise."""
     speed, name = travel.recording.winch_speed[:, cable], travel.column(cable)
+    if travel.is_length(cable) and np.ptp(travel.wound[:, cable]) < MAX_STILL * travel.motion[cable]:
+        return f"{name} is constant", f"record {name}"
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.diff(speed) == 0.0).astype(int), [0]])))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
     for first, last in stretches:

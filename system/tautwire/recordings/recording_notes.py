@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..robot.schema import Robot
 from .consistency import EFFECTS_ON_FORCES, EFFECTS_ON_POSES
@@ -85,6 +86,7 @@ def _load_cell_text(scale: LoadCellScale) -> str:
         causes.append(f"an offset of all load cells of {scale.offset:.3g} N (sensor_offset)")
     if scale.payload is not None:
         causes.append(f"a payload of {scale.payload:.3g} kg (payload)")
+    causes = causes or ["no unit, sign, order, zero or gain that was tried explains it; compare the load cells"]
     apart = ", which statics alone cannot tell apart" if len(causes) > 1 else ""
     return (
         f"tensions carry {100.0 * scale.carried:.1f} % (+- {200.0 * scale.deviation:.1g}) of the platform's "
@@ -93,6 +95,8 @@ def _load_cell_text(scale: LoadCellScale) -> str:
 
 
 def _unexplained_travel(robot: Robot, recording: Recording) -> list[str]:
+    if _is_constant(recording.position) or _is_constant(recording.orientation):
+        return []
     motion, regression = check_motion(robot, recording), length_regression(robot, recording)
     if motion is None or regression is None or not MAX_USUAL_MISFIT < motion.misfit < np.inf:
         return []
@@ -102,3 +106,9 @@ def _unexplained_travel(robot: Robot, recording: Recording) -> list[str]:
         f"cable {cable} most, and no unit, sign, order or frame that was tried explains it; ropes and drums usually "
         f"leave less than {100.0 * MAX_USUAL_MISFIT:.0f} %: compare exit points and encoders"
     ]
+
+
+def _is_constant(values: NDArray[np.float64]) -> bool:
+    """Whether what was measured of positions or quaternions (N, k) is one value, as of a sensor that is dead."""
+    measured = values[np.isfinite(values).all(axis=1)]
+    return bool(len(measured) and not np.ptp(measured, axis=0).any())

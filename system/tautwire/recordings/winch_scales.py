@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 MIN_ERROR, MIN_SIGMAS, MIN_SURVEY_SIGMAS = 0.015, 5.0, 3.0
 # Scale and stretch multiply, and a softer rope overshoots by more.
 STRAINS, AMPLIFICATIONS = 2.0, 3.0
+# What is no drum's: factors beyond, and with a standard deviation of a larger share.
+FACTORS, MAX_DEVIATION_SHARE = (0.2, 5.0), 0.15
 # Residual of a cable's length beside its scale: over that without, and over that beside another exit point.
 MAX_RESIDUAL_SHARE, MAX_RATIO_TO_EXIT_POINT = 0.5, 2.0
 
@@ -58,9 +60,14 @@ def winch_scales(robot: Robot, recording: Recording, lag: float = 0.0) -> tuple[
     scales = []
     for cable, bound in enumerate(bounds):
         scale = _scale(overlap, cable, directions[:, cable], _survey_deviation(robot, cable))
-        if scale is not None and abs(scale.factor - 1.0) > bound:
+        is_drum = scale is not None and FACTORS[0] < scale.factor < FACTORS[1]
+        if scale is not None and is_drum and abs(scale.factor - 1.0) > bound and _is_sharp(scale):
             scales.append(scale)
     return tuple(scales)
+
+
+def _is_sharp(scale: WinchScale) -> bool:
+    return scale.deviation <= MAX_DEVIATION_SHARE * scale.factor
 
 
 def _scale(overlap: Overlap, cable: int, directions: Array, survey_deviation: float) -> WinchScale | None:

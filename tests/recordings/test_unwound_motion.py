@@ -1,0 +1,67 @@
+"""A platform that moves while all winches stand is told; one that swings on its ropes is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.recordings.unwound_motion import unwound_motion_error
+from tests.support.pose_recordings import swinging_recording
+from tests.support.rigid_robots import underactuated_robot
+from tests.support.robots import EXAMPLES, example
+
+
+def standing(name: str, noise: float = 0.0) -> Recording:
+    """The example's recording with winches that stand, or show noise alone."""
+    recording = read_recording(EXAMPLES / name / "check.csv", example(name).cable_count)
+    generator = np.random.default_rng(2)
+    return recording.with_winch_speed(noise * generator.standard_normal(recording.winch_speed.shape))
+
+
+def without_tensions(recording: Recording) -> Recording:
+    return replace(recording, tension=np.full_like(recording.tension, np.nan))
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight", "cogiro", "ipanema"])
+def test_ropes_that_change_by_more_than_tension_stretches_them_are_told(name: str) -> None:
+    error = unwound_motion_error(example(name), standing(name))
+    assert error is not None and error.problem.startswith("all winches stand, and by the positions")
+    assert f"winch_speed_{example(name).cable_count}" in error.hint
+
+
+def test_winches_that_show_noise_alone_stand() -> None:
+    assert unwound_motion_error(example("three"), standing("three", 2e-4)) is not None
+
+
+def test_positions_alone_tell_it() -> None:
+    assert unwound_motion_error(example("three"), without_tensions(standing("three"))) is not None
+
+
+def test_a_platform_that_swings_on_its_ropes_is_no_mistake() -> None:
+    robot = underactuated_robot()
+    assert unwound_motion_error(robot, swinging_recording(robot)) is None
+
+
+def test_a_load_that_stretches_its_ropes_is_no_mistake() -> None:
+    """Of ropes that give by a twentieth of their length under twice the load."""
+    robot, recording = example("three"), standing("three")
+    soft = replace(robot, cables=tuple(replace(cable, modulus=2e9) for cable in robot.cables))
+    lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[:, None], axis=2)
+    stiffness = np.array([cable.modulus * cable.area for cable in soft.cables]) / lengths[0]
+    stretched = replace(recording, tension=2000.0 + stiffness * (lengths - lengths.mean(axis=0)))
+    assert unwound_motion_error(soft, replace(stretched, tension=np.maximum(stretched.tension, 500.0))) is None
+
+
+def test_a_rope_that_was_slack_may_be_any_length() -> None:
+    recording = standing("three")
+    tension = recording.tension.copy()
+    tension[::3, 1] = 0.0
+    assert unwound_motion_error(example("three"), replace(recording, tension=tension)) is None
+
+
+def test_winches_that_wind_are_not_judged() -> None:
+    recording = read_recording(EXAMPLES / "three" / "check.csv", 3)
+    assert unwound_motion_error(example("three"), recording) is None
