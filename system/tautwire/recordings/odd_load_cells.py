@@ -150,7 +150,9 @@ def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterato
     begin = np.array(
         [np.nanmean(column) if has else np.inf for column, has in zip(start.T, has_load_cell, strict=True)]
     )
-    moved = np.nanstd(recording.tension, axis=0, where=np.isfinite(recording.tension))
+    moved = np.array(
+        [np.std(each) if (each := column[np.isfinite(column)]).size else 0.0 for column in recording.tension.T]
+    )
     readings = []
     for unit, size in FORCE_UNITS.items():
         is_small = np.abs(begin) <= np.minimum(MAX_TARED_SHARE * static / size, MAX_TARED_DEVIATIONS * moved)
