@@ -135,6 +135,9 @@ def _other_unit(travel: _Travel, cable: int) -> Texts | None:
     left = float(np.sqrt(np.mean((length + ratio * wound) ** 2))) / travel.motion[cable]
     if WINCH_RATIOS[0] < ratio < WINCH_RATIOS[1] or not _is_explained(left, travel.misfit(cable)):
         return None
+    # Where none follows its winch, the platform swings.
+    if min(travel.misfit(each) for each in range(travel.wound.shape[1])) > MAX_MISFIT:
+        return None
     cause = factor_text([name], abs(ratio), travel.is_length(cable))
     sign = -1.0 if ratio < 0.0 else 1.0
     cause += f", and {name} has the other sign" if sign < 0.0 else ""
