@@ -236,6 +236,17 @@ def test_saved_states_go_on_with_the_same_bits(plain_fmus: RobotFmus, fmi: int) 
         model.fmu.enterEventMode()
 
 
+def test_a_state_of_initialization_is_initialized_again(plain_fmus: RobotFmus, fmi: int) -> None:
+    read, write = ("getFMUstate", "setFMUstate") if fmi == 2 else ("getFMUState", "setFMUState")
+    with in_model_exchange(plain_fmus.cables[0]) as model:
+        saved, expected = getattr(model.fmu, read)(), model.states()
+        model.run()
+        model.go_to(0.3, 0.99 * model.states())
+        getattr(model.fmu, write)(saved)
+        model.run()
+        assert np.array_equal(model.states(), expected)
+
+
 def test_time_of_a_formula_counts_from_the_start(fmi: int, tmp_path: Path) -> None:
     robot = replace(paper_robot(), formulas=(Formula("force_x", "300*time"),))
     with in_model_exchange(build_fmus(robot, tmp_path, native=True, fmi=fmi).platform, 3.0) as model:

@@ -172,7 +172,6 @@ static void motion_instant(const Slave *slave, const double *motion, double *ins
 #ifdef MODEL_EXCHANGE
 static int record_motion(Slave *slave, const double *motion) {
   double instant[INSTANT_SIZE];
-  if (!(slave->start[POSITION_DELAY] > 0.0)) return 1;
   motion_instant(slave, motion, instant);
   return record_instant(slave, instant, slave->start[POSITION_DELAY]);
 }

@@ -49,6 +49,7 @@ static int indicators_now(const Slave *slave, double *indicators) {
 
 static int record_now(Slave *slave) {
   double motion[9];
+  if (!(slave->start[POSITION_DELAY] > 0.0)) return 1;
   memcpy(motion, slave->state.real + FIRST_STATE, MASS_SIZE * sizeof(double));
   return present_acceleration(slave, motion, motion + 6) && record_motion(slave, motion);
 }

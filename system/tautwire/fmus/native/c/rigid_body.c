@@ -212,6 +212,7 @@ static int indicators_now(const Slave *slave, double *indicators) {
 
 static int record_now(Slave *slave) {
   double now[LOAD_SIZE], attitude[ATTITUDE_SIZE], mass[9], points[POINTS_SIZE];
+  if (!(slave->start[POSITION_DELAY] > 0.0)) return 1;
   memcpy(mass, slave->state.real + MASS_STATE, MASS_SIZE * sizeof(double));
   return present_attitude(slave, now, attitude) && present_acceleration(slave, mass, mass + 6) &&
          body_points(attitude, mass, slave->start, points) && record_motion(slave, points);

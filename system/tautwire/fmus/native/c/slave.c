@@ -242,10 +242,11 @@ static SavedState *save_state(const Slave *slave, SavedState *saved) {
   return NULL;
 }
 
-/* In model exchange an importer may roll back from an event into continuous time; a state of co-simulation has no such. */
+/* In model exchange an importer may roll back from an event into continuous time, or to the end of initialization. */
 static void restore_phase(Slave *slave) {
   int phase = slave->state.saved_phase;
-  if (slave->is_model_exchange && (phase == EVENTS || phase == CONTINUOUS_TIME)) slave->phase = (Phase)phase;
+  if (!slave->is_model_exchange) return;
+  if (phase == INITIALIZATION || phase == EVENTS || phase == CONTINUOUS_TIME) slave->phase = (Phase)phase;
 }
 
 static int restore_state(Slave *slave, const SavedState *saved) {
