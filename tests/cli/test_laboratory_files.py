@@ -250,10 +250,6 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     "one sample": (lambda frame: text_of(frame.iloc[:1]), "has 1 sample, must have at least 2"),
     "nothing": (lambda frame: "", "is empty"),
     "a workbook": (lambda frame: b"PK\x03\x04" + bytes(100), "a zip archive or a spreadsheet, not text"),
-    "winches that stand while the platform moves": (
-        lambda f: text_of(f.assign(**dict.fromkeys(SPEEDS, 0.0))),
-        "all winches stand, and by the positions ropes change in length by up to ",
-    ),
     "positions in mm beside a gap": (
         lambda f: text_of(f.assign(**{axis: 1e3 * f[axis] for axis in AXES}).drop(index=range(150, 300))),
         "x, y, z are in mm",

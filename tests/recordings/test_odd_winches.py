@@ -95,15 +95,6 @@ def test_a_fault_of_a_recorded_length_is_told_by_its_column(change: Change, caus
     assert odd.cable == CABLE and cause in odd.cause and "rope_length_2" in odd.remedy
 
 
-def test_a_rope_length_that_never_changes_is_told_as_such() -> None:
-    recording = recorded()
-    speeds = recording.winch_speed.copy()
-    speeds[:, CABLE - 1] = 1e-17 * np.sin(recording.time)
-    still = recording.with_winch_speed(speeds)
-    (odd,) = odd_winches(example("three"), replace(still, rope_length=-still.wound_lengths()))
-    assert (odd.cable, odd.cause, odd.remedy) == (CABLE, "rope_length_2 is constant", "record rope_length_2")
-
-
 @pytest.mark.parametrize("factor", [95.5, -95.5, 0.2, 3e4, -2.0])
 def test_a_factor_that_is_no_drums_is_told_with_its_sign(factor: float) -> None:
     def scaled(time: np.ndarray, speeds: np.ndarray) -> None:

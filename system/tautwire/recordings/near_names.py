@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from ..errors import RecordingError, format_value
 from ..robot.recorded_columns import column_line
-from ..robot.schema import RecordedColumn
+from ..robot.schema import AXES, RecordedColumn
 from .units import find_unit
 
 _WORD = re.compile(r"[A-Za-z]+|[0-9]+")
+_TENSION = re.compile(r"tension_[0-9]+")
 _AROUND_UNIT = " \t_-.,:;/|[](){}<>"
+# They end names of other things, too: x_in is an input or reference.
+_UNITS_IN_BRACKETS = frozenset({"in", "g", "h", "d", "min", "s"})
 
 
 def nearly_named(name: str, columns: Iterable[str]) -> RecordedColumn | None:
@@ -27,6 +30,8 @@ def nearly_named(name: str, columns: Iterable[str]) -> RecordedColumn | None:
             continue
         tail = name[words[len(wanted) - 1].end() :].strip(_AROUND_UNIT)
         text = re.sub(r"^in[\s_]+", "", tail)
+        if text in _UNITS_IN_BRACKETS and not re.search(r"[\[({<]", name):
+            return None
         unit = find_unit(f"[{text}]", column) if text and not text.isdigit() else None
         if unit is not None or not text:
             return RecordedColumn(column, name, "" if unit is None or unit.symbol == "1" else unit.symbol)
@@ -43,3 +48,18 @@ def near_name_errors(
             problem = f"the column {format_value(name)} is not read, and {column.column} is missing"
             hint = f"write into [{table}] {column_line(column)}, or rename it, of another quantity too"
             yield RecordingError(where, problem, hint, line)
+
+
+def columns_of_absent_kinds(columns: Iterable[str], names: Collection[str]) -> list[str]:
+    """Those of the columns of tensions and of positions where not one of the kind is among a recording's names.
+
+    Where one is, others were left out on purpose: of a load cell that is dead, or across a planar robot's plane.
+    """
+    read = {_kind(name) for name in names}
+    return sorted(column for column in columns if _kind(column) is not None and _kind(column) not in read)
+
+
+def _kind(name: str) -> str | None:
+    if _TENSION.fullmatch(name):
+        return "tension"
+    return "position" if name in AXES else None

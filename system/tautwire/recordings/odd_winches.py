@@ -31,7 +31,7 @@ MAX_MOVED = 2.0  # of an exit point's distance from the start
 DRUM_SCALES = (0.7, 1.4)
 # Of a unit that is written otherwise, and of drums; what is farther off is an angle or a count.
 MAX_UNIT_ERROR, WINCH_RATIOS = 0.03, (0.25, 4.0)
-MIN_HELD_SAMPLES, MIN_TAUT_SHARE, MAX_STILL = 20, 0.2, 1e-6
+MIN_HELD_SAMPLES, MIN_TAUT_SHARE = 20, 0.2
 # Of samples, and of the rope's speed to the one that is recorded in them.
 MIN_CLIPPED_SHARE, MIN_CLIPPED_RATIO = 0.03, 1.2
 SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
@@ -160,8 +160,6 @@ def _copied(travel: _Travel, cable: int) -> Texts | None:
 def _held(travel: _Travel, cable: int) -> Texts | None:
     """One speed for long while a taut rope's length changes otherwise."""
     speed, name = travel.recording.winch_speed[:, cable], travel.column(cable)
-    if travel.is_length(cable) and np.ptp(travel.wound[:, cable]) < MAX_STILL * travel.motion[cable]:
-        return f"{name} is constant", f"record {name}"
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (np.diff(speed) == 0.0).astype(int), [0]])))
     stretches = sorted(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True), key=lambda rows: rows[0] - rows[1])
     for first, last in stretches:
@@ -213,7 +211,7 @@ def _unsigned(travel: _Travel, cable: int) -> Texts | None:
     """No speed below zero though the rope becomes longer on its way."""
     speed, length = travel.recording.winch_speed[:, cable], travel.lengths[:, cable]
     paid_out = float(np.max(length - np.minimum.accumulate(length)))
-    if travel.is_length(cable) or np.any(speed < 0.0) or paid_out < travel.motion[cable]:
+    if travel.is_length(cable) or np.any(speed < 0.0) or paid_out < travel.motion[cable] or not np.any(speed):
         return None
     name = travel.column(cable)
     return f"{name} is never negative", f"record {name} with its sign, negative where the rope pays out"

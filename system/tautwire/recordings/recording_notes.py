@@ -12,6 +12,7 @@ from .mistaken_motion import check_motion
 from .motion_regression import length_regression
 from .position_lag import PositionLag, position_lag
 from .recording import Recording
+from .unwound_motion import unwound_motion_text
 from .winch_scales import WinchScale, winch_scales
 
 # Of lifelike recordings the ropes' motion and the winch travel differ by less.
@@ -29,7 +30,8 @@ def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
     notes = [_lag_text(lag)] if lag else []
     notes += [f"{_scales_text(scales)}: {_drums_text(scales)}"] if scales else []
     if not (notes or declared & EFFECTS_ON_POSES):
-        notes += _unexplained_travel(robot, recording)
+        unwound = unwound_motion_text(robot, recording)
+        notes += [unwound] if unwound else _unexplained_travel(robot, recording)
     if not (robot.formulas or declared & EFFECTS_ON_FORCES):
         scale = load_cell_scale(robot, recording)
         notes += [_load_cell_text(scale)] if scale else []

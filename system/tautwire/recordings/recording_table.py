@@ -15,7 +15,7 @@ from ..errors import RecordingError, UnknownColumnsError, format_value, raise_er
 from ..name_suggestions import closest_name, join_names
 from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .clock_time import ClockFormat
-from .near_names import near_name_errors
+from .near_names import columns_of_absent_kinds, near_name_errors
 from .number_hints import hint_for_number
 from .quaternion_columns import missing_quaternion_columns, quaternion_problem
 from .units import Number, Unit
@@ -144,9 +144,11 @@ def _missing_column_errors(
         problem = f"the orientation has no column {join_names(lacking)}, of {join_names(QUATERNION_COLUMNS)}"
         hint = "add it, declare its name in [recording.columns], or rename the others so that they are not read"
         yield RecordingError(where, problem, hint, line)
-    absent = known_columns(cable_count) - set(names) - {"time"}
-    outputs = sorted(name for name in absent if not name.startswith(WINCH_COLUMNS))
-    yield from near_name_errors(unknown_names, outputs, where, table.partition("]")[0], line)
+    if missing and not cable_count:
+        # The command that the error of a tracker names proposes its other columns too.
+        return
+    absent = columns_of_absent_kinds(known_columns(cable_count), names)
+    yield from near_name_errors(unknown_names, absent, where, table.partition("]")[0], line)
 
 
 def require_samples(count: int, where: str) -> None:

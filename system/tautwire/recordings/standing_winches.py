@@ -29,3 +29,8 @@ def without_noise_of_standing_winches(robot: Robot, recording: Recording) -> tup
     winches = ", ".join(str(index + 1) for index in np.flatnonzero(stands))
     note = f"{recording.path}: winches stand, their speeds are noise and were taken as zero: {winches}"
     return recording.with_winch_speed(np.where(stands, 0.0, recording.winch_speed)), (note,)
+
+
+def all_winches_stand(robot: Robot, recording: Recording) -> bool:
+    """Whether no winch turns throughout, as in a ring-down: what they show is zero, or noise."""
+    return not np.any(without_noise_of_standing_winches(robot, recording)[0].winch_speed)

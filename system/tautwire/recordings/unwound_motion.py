@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError
 from ..robot.schema import Robot
 from .geometry_reading import GeometryReading, recorded_poses
 from .recording import Recording
-from .standing_winches import without_noise_of_standing_winches
+from .standing_winches import all_winches_stand
 from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
@@ -21,16 +20,19 @@ MIN_TAUT_SHARE = 0.2
 MIN_LENGTH_SHARE = 0.003  # of a rope, which a survey and pulleys may be off by where the platform swings
 
 
-def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError | None:
-    """The error of winches that stand throughout while the ropes' geometric lengths change; None otherwise.
+def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
+    """What is to be said of winches that stand throughout while the ropes' geometric lengths change, None otherwise.
 
     A taut rope on a winch that stands changes by ``L dT / (E A)``; all ropes have to change by far more, and where no
     tension was measured by far more than any load stretches them. A load that swings on one rope keeps the length of
-    that. None where a rigid platform's orientation is not known.
+    that. It is no error: hands lift platforms, and ropes creep. None where a rigid platform's orientation is not known.
     """
     is_rigid = robot.platform.is_rigid_body
-    stands = not np.any(without_noise_of_standing_winches(robot, recording)[0].winch_speed)
-    if not stands or not recording.has_position or (is_rigid and not recording.has_orientation):
+    if (
+        not all_winches_stand(robot, recording)
+        or not recording.has_position
+        or (is_rigid and not recording.has_orientation)
+    ):
         return None
     measured = recording.position[:, np.isfinite(recording.position).any(axis=0)]
     pose = np.hstack([measured, recording.orientation]) if is_rigid else measured
@@ -46,13 +48,11 @@ def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError |
     limits = np.maximum(limits, MIN_LENGTH_SHARE * lengths.mean(axis=0))
     if np.any(_deviations(lengths) <= limits):
         return None
-    names = "rope_length" if recording.rope_lengths else "winch_speed"
-    problem = (
+    return (
         f"all winches stand, and by the positions ropes change in length by up to {np.ptp(lengths, axis=0).max():.3g} "
-        "m, far more than tension stretches them"
+        "m, far more than tension stretches them: the platform was held or lifted, ropes creep, or the columns of the "
+        "winches are not of this motion"
     )
-    hint = f"record {names}_1 to {names}_{robot.cable_count} of the same motion, or give the positions that belong here"
-    return RecordingError(recording.path, problem, hint)
 
 
 def _deviations(values: Array) -> Array:
