@@ -95,6 +95,16 @@ def test_a_fault_of_a_recorded_length_is_told_by_its_column(change: Change, caus
     assert odd.cable == CABLE and cause in odd.cause and "rope_length_2" in odd.remedy
 
 
+def test_a_winch_that_stands_with_a_slack_rope_is_no_fault() -> None:
+    """From where the line is longest on it is shorter than the rope."""
+    robot, recording = example("three"), recorded()
+    begin = int(np.argmax(np.linalg.norm(recording.position - np.array(robot.anchors[2]), axis=1)))
+    speeds = recording.winch_speed.copy()
+    speeds[:, 2] = 0.0
+    standing = recording.with_winch_speed(speeds).part(begin, recording.sample_count)
+    assert odd_winches(robot, replace(standing, tension=np.full_like(standing.tension, np.nan))) == ()
+
+
 @pytest.mark.parametrize("factor", [95.5, -95.5, 0.2, 3e4, -2.0])
 def test_a_factor_that_is_no_drums_is_told_with_its_sign(factor: float) -> None:
     def scaled(time: np.ndarray, speeds: np.ndarray) -> None:
