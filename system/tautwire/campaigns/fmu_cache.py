@@ -15,7 +15,8 @@ from typing import Any
 from tautwire_fmu.effect_variables import setting_name
 from tautwire_fmu.rigid_body_variables import INERTIA_ENTRIES
 
-from ..fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, start_values, winch_resource
+from ..fmus.component_resources import cable_resources, platform_resource, winch_resource
+from ..fmus.packaging import RobotFmus, build_fmus, start_values
 from ..robot.active_effects import has_sensor_effects
 from ..robot.schema import Robot
 

@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from tautwire.fmus.component_resources import cable_resources, platform_resource, winch_resource
 from tautwire.fmus.native.native_archive import python_slave
-from tautwire.fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, winch_resource
+from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Robot
 from tautwire_fmu.cable_slave import AppliedMotion, Cable
 from tautwire_fmu.laws.mathematics import REAL

@@ -11,8 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.control import Feedforward, build_native_controller_fmu
+from tautwire.fmus.component_resources import cable_resources, platform_resource, winch_resource
 from tautwire.fmus.native.native_archive import python_slave
-from tautwire.fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, winch_resource
+from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.trajectory import Line
 from tautwire_fmu.cable_slave import AppliedMotion, Cable
 from tautwire_fmu.laws import cable as cable_law

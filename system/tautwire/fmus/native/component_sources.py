@@ -7,7 +7,6 @@ import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from importlib.resources import files
 from typing import Any
 
@@ -18,22 +17,18 @@ from tautwire_fmu.laws.sampled_control import plan_from_resource
 from tautwire_fmu.model_description import Variable
 from tautwire_fmu.slave import MIDDLE_TIME, Slave
 
-from .cable_functions import START_SIZE, cable_functions
+from .cable_functions import START_SIZE
+from .component_equations import component_equations, indicator_count
 from .interpolation_functions import (
     MOTION_SIZE,
-    cubic_function,
-    motion_functions,
-    quadrature_functions,
-    quintic_function,
 )
 from .model_exchange import further_variables
-from .platform_functions import POINT_MASS_PARAMETERS, SENSOR_SIZE, mass_functions
-from .rigid_body_functions import rigid_body_functions, start_size
-from .robot_functions import robot_functions, robot_structure
+from .platform_functions import SENSOR_SIZE
+from .rigid_body_functions import start_size
 from .robot_slave import WholeRobot
 from .robot_structure import robot_constants, robot_macros, robot_state_scales
-from .traced_functions import INDICATORS, LARGEST_NUMBER, TracedFunction, c_source
-from .winch_functions import DRIVE_SIZE, LIMIT_COUNT, winch_functions
+from .traced_functions import LARGEST_NUMBER, c_source
+from .winch_functions import DRIVE_SIZE, LIMIT_COUNT
 
 ENTRY_FILE = "all.c"
 CODE_FILE = "code.c"
@@ -41,7 +36,7 @@ START_FILE = "start_values.c"
 STRUCTURE_FILE = "structure.h"
 EQUATIONS_FILE = "equations.c"
 DELAY_FILE = "delayed_signal.c"
-SLAVE_FILES = ("slave.c", "partial_derivatives.c")
+SLAVE_FILES = ("slave.c", "saved_state.c", "partial_derivatives.c")
 FMI_FILES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 MODEL_EXCHANGE_FILES = {fmi: ("model_exchange.c", f"fmi{fmi}_model_exchange.c") for fmi in FMI_FILES}
 # The input whose rate another input is, by the names without axis.
@@ -100,7 +95,7 @@ def component_sources(
         {
             **sources,
             STRUCTURE_FILE: structure,
-            EQUATIONS_FILE: c_source(_equations(kind, _equation_structure(data))),
+            EQUATIONS_FILE: c_source(component_equations(kind, data)),
             CODE_FILE: _code(component, fmi),
             START_FILE: _start_values(slave, component, guid),
             ENTRY_FILE: _entry(data["model_name"], fmi),
@@ -113,14 +108,14 @@ def _cable(slave: Slave, data: Mapping[str, Any]) -> _Component:
     effects = effects_from_resource(dict(data))
     scales = (LENGTH_SCALE, LENGTH_SCALE, *(state.scale for effect in effects for state in effect.states))
     macros = {"MOTION_SIZE": MOTION_SIZE, "START_SIZE": START_SIZE, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
-    return _Component(("cable.c",), macros, state_scales=scales, indicator_count=_indicator_count("cable", data))
+    return _Component(("cable.c",), macros, state_scales=scales, indicator_count=indicator_count("cable", data))
 
 
 def _point_mass(slave: Slave, data: Mapping[str, Any]) -> _Component:
     names = [variable.name for variable in slave.variables]
     start_velocity = data.get("start_velocity", (0.0, 0.0, 0.0))
     macros = _platform_macros(slave, data) | {"FIRST_FORCE": names.index("force_1.x")}
-    count = _indicator_count("point_mass", data)
+    count = indicator_count("point_mass", data)
     return _Component(("platform.c", "point_mass.c"), macros, start_velocity, indicator_count=count)
 
 
@@ -138,7 +133,7 @@ def _rigid_body(slave: Slave, data: Mapping[str, Any]) -> _Component:
         "START_SIZE": start_size(cable_count),
     }
     c_files = ("platform.c", "principal_axes.c", "rigid_body.c")
-    return _Component(c_files, macros, constants, indicator_count=_indicator_count("rigid_body", data))
+    return _Component(c_files, macros, constants, indicator_count=indicator_count("rigid_body", data))
 
 
 def _platform_macros(slave: Slave, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -193,41 +188,6 @@ COMPONENTS: Mapping[str, Callable[[Slave, Mapping[str, Any]], _Component]] = {
     "controller": _controller,
     "robot": _robot,
 }
-# Of a resource all that equations depend on; effects do by their names.
-EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas", "attachments")
-
-
-def _equation_structure(data: Mapping[str, Any]) -> str:
-    if "cables" in data:
-        return json.dumps(robot_structure(data), sort_keys=True)
-    effects = [{**effect, "values": None} for effect in data.get("effects", ())]
-    attachments = [None for _ in data.get("attachments", ())]
-    structure = {name: data.get(name) for name in EQUATION_KEYS}
-    return json.dumps({**structure, "effects": effects, "attachments": attachments}, sort_keys=True)
-
-
-def _indicator_count(kind: str, data: Mapping[str, Any]) -> int:
-    """Number of event indicators of a component, by its traced equations."""
-    functions = _equations(kind, _equation_structure(data))
-    return sum(function.outputs.get(INDICATORS, 0) for function in functions)
-
-
-@cache
-def _equations(kind: str, structure: str) -> tuple[TracedFunction, ...]:
-    """Traced equations of a kind of component; ``structure`` is that part of its resource, as JSON."""
-    data = json.loads(structure)
-    functions: tuple[TracedFunction, ...]
-    if kind == "cable":
-        functions = (*cable_functions(data), *motion_functions())
-    elif kind == "point_mass":
-        functions = (*mass_functions(data, POINT_MASS_PARAMETERS), *quadrature_functions(), quintic_function())
-    elif kind == "rigid_body":
-        functions = (*rigid_body_functions(data), *quadrature_functions(), quintic_function())
-    elif kind == "robot":
-        functions = robot_functions(data)
-    else:
-        functions = winch_functions() if kind == "winch" else ()
-    return (*functions, cubic_function())
 
 
 def _structure(slave: Slave, component: _Component, further: Sequence[Variable]) -> str:
