@@ -26,6 +26,7 @@ from tautwire_fmu.laws.rotation import (
     Quaternion,
     multiply,
     quaternion_of,
+    quaternion_rate,
     rotation_matrix,
     rotation_vector_rate,
 )
@@ -274,9 +275,8 @@ def _weights(later_nodes: int) -> tuple[Any, Any]:
 
 
 def _quaternion_rate(m: Mathematics, columns: Columns) -> Columns:
-    """Rate of the quaternion: half its product with the angular velocity in the platform's axes."""
     _, velocity, _ = _split_attitude(columns["attitude"])
-    return {"rate": multiply(columns["quaternion"], (0.0, *scale(0.5, velocity)))}
+    return {"rate": quaternion_rate(columns["quaternion"], velocity)}
 
 
 def _quaternions(m: Mathematics, start: Quaternion, angles: Sequence[Any]) -> tuple[Quaternion, Quaternion]:
