@@ -97,8 +97,15 @@ def test_outputs_depend_on_states_and_on_the_inputs_of_co_simulation(plain_fmus:
         states = {unknown.variable.derivative.name for unknown in latter.derivatives}
         for before, after in zip(former.outputs, latter.outputs, strict=True):
             known, new = ({each.name for each in unknown.dependencies} for unknown in (before, after))
-            assert new - known <= states and new - states == known
+            assert new - known <= {*states, "time"} and new - states - {"time"} == known
             assert new & states or after.variable.name.startswith("middle_")
+
+
+def test_by_fmi_3_outputs_that_are_no_states_depend_on_the_time(tmp_path: Path) -> None:
+    """A formula with the time, or a sensor that lags, changes them while inputs and states stay."""
+    outputs = fmpy.read_model_description(str(build_fmus(paper_robot(), tmp_path, native=True, fmi=3).platform)).outputs
+    known = {output.variable.name: {each.name for each in output.dependencies} for output in outputs}
+    assert "time" in known["acceleration.x"] and "time" not in known["position.x"]
 
 
 @pytest.mark.validate(but=["2"])
@@ -234,6 +241,14 @@ def test_saved_states_go_on_with_the_same_bits(plain_fmus: RobotFmus, fmi: int) 
         getattr(model.fmu, write)(saved)
         assert np.array_equal(model.rates(), expected)
         model.fmu.enterEventMode()
+
+
+def test_nominals_alone_are_known_before_initialization(plain_fmus: RobotFmus) -> None:
+    with in_model_exchange(plain_fmus.cables[0]) as model:
+        expected = model.nominals()
+        model.fmu.reset()
+        assert np.array_equal(model.nominals(), expected)
+        assert_refused(model.states, model.rates)
 
 
 def test_a_state_of_initialization_is_initialized_again(plain_fmus: RobotFmus, fmi: int) -> None:

@@ -101,13 +101,16 @@ def _float_variable(variable: Element, references: list[str]) -> Element:
 
 def _structure(fmi2: Element, references: list[str]) -> Element:
     structure = Element("ModelStructure")
+    times = [str(len(references))] if fmi2.find("ModelExchange") is not None else []
     indicator_count = int(fmi2.get("numberOfEventIndicators", "0"))
     for tag, former in STRUCTURE_TAGS.items():
         for unknown in fmi2.findall(f"ModelStructure/{former}/Unknown"):
             attributes = {"valueReference": references[int(unknown.attrib["index"]) - 1]}
             if "dependencies" in unknown.attrib:
                 places = unknown.attrib["dependencies"].split()
-                attributes["dependencies"] = " ".join(references[int(place) - 1] for place in places)
+                # A sensor that lags and a formula with the time change while inputs and states do not.
+                own = [] if places == [unknown.attrib["index"]] or tag != "Output" else times
+                attributes["dependencies"] = " ".join([*(references[int(place) - 1] for place in places), *own])
             SubElement(structure, tag, attributes)
     for reference in references[len(references) - indicator_count :]:
         SubElement(structure, "EventIndicator", {"valueReference": reference})

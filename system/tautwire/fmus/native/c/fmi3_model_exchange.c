@@ -66,7 +66,8 @@ fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 states[], size_t 
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t count) {
-  return get_numbers(c, get_nominals, nominals, count, STATE_COUNT);
+  if (count != STATE_COUNT) return refuse(c, "as many numbers as states are needed");
+  return (fmi3Status)get_nominals(&((Instance3 *)c)->slave, nominals);
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t count) {
