@@ -52,6 +52,12 @@ def test_build_writes_the_whole_robot_as_one_fmu(
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["robot.fmu"]
 
 
+def test_a_robot_file_that_asks_for_native_fmus_takes_their_options(robot_file: Path, tmp_path: Path) -> None:
+    native = tmp_path / "native.toml"
+    native.write_text(robot_file.read_text(encoding="utf-8") + "\n[fmu]\nnative = true\n", encoding="utf-8")
+    assert run(["build", str(native), "--out", str(tmp_path / "out"), "--whole"]) == 0
+
+
 def test_simulate_runs_native_fmus_to_the_same_result(robot_file: Path, tmp_path: Path) -> None:
     speeds = {f"winch_speed_{i}": [0.0, 0.05 * i, 0.0] for i in (1, 2, 3)}
     pd.DataFrame({"time": [0.0, 0.2, 0.4]} | speeds).to_csv(tmp_path / "speeds.csv", index=False)

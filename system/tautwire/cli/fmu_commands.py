@@ -78,7 +78,7 @@ def build(
     robot = read_holdable_robot(robot_file)
     targets = [name.strip() for name in platforms.split(",") if name.strip()]
     native_options = {"--whole": whole, "--platforms": bool(platforms), "--co-simulation-only": co_simulation_only}
-    _refuse_mixed_kinds(for_c_hosts, native, fmi, native_options)
+    _refuse_mixed_kinds(for_c_hosts, native or robot.native_fmus, fmi, native_options)
     if whole:
         _build_whole(robot, out, targets, fmi, output)
         return
@@ -122,7 +122,7 @@ def _build_whole(robot: Robot, out: Path, targets: Sequence[str], fmi: int, outp
 
 def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, fmi: int, native_options: Mapping[str, bool]) -> None:
     if native and for_c_hosts:
-        raise InputError("--for-c-hosts", "is given beside --native, which any program can run", "leave it out")
+        raise InputError("--for-c-hosts", "is given beside native FMUs, which any program can run", "leave it out")
     for option, is_given in native_options.items():
         if is_given and not native:
             raise InputError(option, "is given without --native", "add --native")
