@@ -6,6 +6,7 @@ raise ``tautwire.errors.ArgumentError``; every exception raised on purpose is a 
 ========================== ========================================================================================
 ``read_robot``             reads the robot that a TOML file declares
 ``build_fmus``             builds its FMUs, for other tools and for our co-simulation master
+``build_whole_fmu``        builds the whole robot as one FMU of machine code
 ``cosimulate``             co-simulates the FMUs over winch speeds; results as arrays or a pandas frame
 ``Line``                   a straight rest-to-rest trajectory
 ``ideal_winch_speeds``     inverse kinematics: the winch speeds of a trajectory for inelastic cables
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from .control import cosimulate_closed_loop, design_controller
     from .cosimulation.robot_cosimulation import cosimulate
     from .estimation import trace
-    from .fmus.packaging import build_fmus
+    from .fmus.packaging import build_fmus, build_whole_fmu
     from .linear import bode_figure, linearise, modes_along, modes_along_figure
     from .recordings.recording import read_recording, recording_from_frame
     from .reports import write_report
@@ -50,6 +51,7 @@ __all__ = [
     "Line",
     "bode_figure",
     "build_fmus",
+    "build_whole_fmu",
     "cosimulate",
     "cosimulate_closed_loop",
     "design_controller",
@@ -69,6 +71,7 @@ _MODULES = {
     "Line": ".robot.trajectory",
     "bode_figure": ".linear",
     "build_fmus": ".fmus.packaging",
+    "build_whole_fmu": ".fmus.packaging",
     "cosimulate": ".cosimulation.robot_cosimulation",
     "cosimulate_closed_loop": ".control",
     "design_controller": ".control",
