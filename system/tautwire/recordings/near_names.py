@@ -55,8 +55,8 @@ def columns_of_absent_kinds(columns: Iterable[str], names: Collection[str]) -> l
 
     Where one is, others were left out on purpose: of a load cell that is dead, or across a planar robot's plane.
     """
-    read = {_kind(name) for name in names}
-    return sorted(column for column in columns if _kind(column) is not None and _kind(column) not in read)
+    read = {None, *map(_kind, names)}
+    return sorted(column for column in columns if _kind(column) not in read)
 
 
 def _kind(name: str) -> str | None:

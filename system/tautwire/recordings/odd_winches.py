@@ -79,6 +79,17 @@ class _Travel:
         """What to call a cable's speed."""
         return f"the rate of {self.column(cable)}" if self.is_length(cable) else self.column(cable)
 
+    def ratio(self, cable: int) -> float:
+        """Length of a cable by what was wound, by least squares; 1 where nothing was."""
+        wound = self.wound[:, cable]
+        energy = float(wound @ wound)
+        return -float(self.lengths[:, cable] @ wound) / energy if energy > 0.0 else 1.0
+
+    def share_missed(self, cable: int, factor: float) -> float:
+        """Rms of what a cable's length misses with a factor on what was wound, over that of its motion."""
+        missed = self.lengths[:, cable] + factor * self.wound[:, cable]
+        return float(np.sqrt(np.mean(missed**2)) / self.motion[cable])
+
     def misfit(self, cable: int, *others: Array) -> float:
         """Rms of a cable's length beside constant, a drum's scale and other columns (M,), over that of its motion."""
         wound, length = self.wound[:, cable], self.lengths[:, cable]
@@ -118,29 +129,33 @@ def _longest_part(recording: Recording) -> Recording:
 
 def _fault(travel: _Travel, cable: int) -> Texts | None:
     """The fault of a winch's column, as a clause, and what mends it; None where none is seen."""
-    faults = (_other_unit, _copied, _held, _clipped, _wrapped, _unsigned, _jump)
+    faults = (_other_unit, _other_factor, _copied, _held, _clipped, _wrapped, _unsigned, _jump)
     return next((texts for fault in faults if (texts := fault(travel, cable))), None)
 
 
 def _other_unit(travel: _Travel, cable: int) -> Texts | None:
-    """A unit, or a factor that no drum is off by, with which a rope's length follows its winch."""
-    length, wound, name = travel.lengths[:, cable], travel.wound[:, cable], travel.column(cable)
-    energy = float(wound @ wound)
-    ratio = -float(length @ wound) / energy if energy > 0.0 else 1.0
+    """A unit in which a rope's length follows its winch."""
+    name, ratio = travel.column(cable), travel.ratio(cable)
     for unit, size in (LENGTH_UNITS if travel.is_length(cable) else SPEED_UNITS).items():
-        left = float(np.sqrt(np.mean((length + size * wound) ** 2))) / travel.motion[cable]
-        if size != 1.0 and _is_explained(left, travel.misfit(cable)) and abs(ratio / size - 1.0) <= MAX_UNIT_ERROR:
+        is_near = size != 1.0 and abs(ratio / size - 1.0) <= MAX_UNIT_ERROR
+        if is_near and _is_explained(travel.share_missed(cable, size), travel.misfit(cable)):
             mistake = Mistake(f"{name} is in {unit}", convert(name, size), scaled((name,), size, unit))
             return mistakes_text([[mistake]], travel.recording)
-    left = float(np.sqrt(np.mean((length + ratio * wound) ** 2))) / travel.motion[cable]
-    if WINCH_RATIOS[0] < ratio < WINCH_RATIOS[1] or not _is_explained(left, travel.misfit(cable)):
+    return None
+
+
+def _other_factor(travel: _Travel, cable: int) -> Texts | None:
+    """A factor that no drum is off by, with which a rope's length follows its winch."""
+    name, ratio = travel.column(cable), travel.ratio(cable)
+    is_drums = WINCH_RATIOS[0] < ratio < WINCH_RATIOS[1]
+    if is_drums or not _is_explained(travel.share_missed(cable, ratio), travel.misfit(cable)):
         return None
     # Where none follows its winch, the platform swings.
     if min(travel.misfit(each) for each in range(travel.wound.shape[1])) > MAX_MISFIT:
         return None
-    cause = factor_text([name], abs(ratio), travel.is_length(cable))
     sign = -1.0 if ratio < 0.0 else 1.0
-    cause += f", and {name} has the other sign" if sign < 0.0 else ""
+    other_sign = f", and {name} has the other sign" if sign < 0.0 else ""
+    cause = factor_text([name], abs(ratio), travel.is_length(cable)) + other_sign
     better = "or better by the factor that follows from the drum's radius and what is recorded in one turn of it"
     correction = ColumnCorrection(name, factor=float(f"{abs(ratio):.6g}"), sign=sign)
     return mistakes_text([[Mistake(cause, f"{convert(name, ratio)}, {better}", (correction,))]], travel.recording)
