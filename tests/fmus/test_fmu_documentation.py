@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 import tautwire
-from tautwire.fmus.fmu_documentation import LAWS
+from tautwire.fmus.fmu_documentation import LAWS, WHOLE_ROBOT
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import EffectSetting, Formula
 from tests.pictures.component_icons import ICONS, draw_icons
@@ -81,7 +81,7 @@ def test_licenses_of_all_that_travels_inside_are_there(three_fmus: RobotFmus) ->
 
 def test_each_kind_of_component_has_its_icon(winch_fmus: RobotFmus, tmp_path: Path) -> None:
     draw_icons(tmp_path)
-    assert set(ICONS) == set(LAWS)
+    assert set(ICONS) == {*LAWS, WHOLE_ROBOT}
     for name, kind in {"platform": "point_mass", "cable_1": "cable", "winch_1": "winch"}.items():
         icon = Image.open(io.BytesIO(entry(winch_fmus.by_component[name], "model.png")))
         drawn = Image.open(tmp_path / f"{kind}.png")

@@ -74,8 +74,9 @@ def robot_resource(robot: Robot) -> dict[str, Any]:
     formulas = {
         f"{name}, {quantity}": texts for name, each in parts.items() for quantity, texts in each["formulas"].items()
     }
+    components = "platform, cables and winches" if robot.winch else "platform and cables"
     return {
-        "description": f"{robot.name}: platform, cables and winches in one",
+        "description": f"{robot.name}: {components} in one",
         "is_rigid": robot.platform.is_rigid_body,
         "platform": platform,
         "cables": cables,

@@ -20,16 +20,16 @@ from tautwire_fmu.laws.effects import BY_NAME
 if TYPE_CHECKING:
     from jinja2 import Template
 
-LAWS: Mapping[str, tuple[ModuleType, ...]] = {
-    "cable": (cable,),
-    "point_mass": (point_mass,),
-    "rigid_body": (rigid_body,),
-    "winch": (winch_drive,),
-    "controller": (sampled_control,),
-    "robot": (cable, point_mass, rigid_body, winch_drive),
+LAWS: Mapping[str, ModuleType] = {
+    "cable": cable,
+    "point_mass": point_mass,
+    "rigid_body": rigid_body,
+    "winch": winch_drive,
+    "controller": sampled_control,
 }
+WHOLE_ROBOT = "robot"
 # Modules that say what goes in and out, where it is not the slave of this kind in the package that FMUs contain.
-SLAVE_MODULES = {"robot": ("tautwire.fmus.native", "robot_slave.py")}
+SLAVE_MODULES = {WHOLE_ROBOT: ("tautwire.fmus.native", "robot_slave.py")}
 # What model exchange adds.
 FURTHER = "further"
 TABLES = {
@@ -53,7 +53,8 @@ def documentation_files(
 ) -> dict[str, bytes]:
     """Contents by path in the archive: ``documentation/index.html``, the licenses, and the icon where FMI has it.
 
-    ``kind`` is a key of :data:`LAWS`, ``data`` the resource of the FMU, ``packages`` those whose code is in it.
+    ``kind`` is a key of :data:`LAWS` or :data:`WHOLE_ROBOT`, ``data`` the resource of the FMU, ``packages`` those
+    whose code is in it.
     """
     return {
         "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
@@ -72,7 +73,7 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
         tool=description.generationTool,
         component_blocks=_text_blocks(_slave_docstring(kind)),
         law=data.get("law"),
-        law_blocks=[block for law in LAWS[kind] for block in _text_blocks(law.__doc__ or "")],
+        law_blocks=[block for law in _laws(kind, data) for block in _text_blocks(law.__doc__ or "")],
         effects=[BY_NAME[setting["name"]] for setting in data.get("effects", ())],
         formulas=data.get("formulas") or {},
         has_model_exchange=description.modelExchange is not None,
@@ -82,6 +83,14 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
             if kind_of != FURTHER or description.modelExchange is not None
         },
     )
+
+
+def _laws(kind: str, data: Mapping[str, Any]) -> list[ModuleType]:
+    """Laws of a component, or of the components that a whole robot has."""
+    if kind != WHOLE_ROBOT:
+        return [LAWS[kind]]
+    platform = "rigid_body" if data["is_rigid"] else "point_mass"
+    return [LAWS[part] for part in ("cable", platform, *(["winch"] if data["winches"] else []))]
 
 
 def _kind_of(variable: ScalarVariable) -> str:

@@ -190,6 +190,7 @@ def test_either_version_has_source_page_and_icon_and_gives_the_same_bits(fmi: in
     assert [name for name in names if name.endswith(".png")]
     for words in ("Its platform, its cables and its winches", "(m + sum of added masses) a", "T = E S ln(l / l_u)"):
         assert words in page
+    assert "rigid body" not in page and "winch drive" not in page and "paper: platform and cables in one" in page
     one, other = (
         fmpy.simulate_fmu(str(each), stop_time=0.1, start_values={"winch_speed_1": 0.1}, output=["tension_1"])
         for each in (plain, path)
