@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, run_cosimulation
 from tautwire.estimation.cosimulation_validation import cosimulate_data_set
 from tautwire.estimation.estimation_data import DataSet
 from tautwire.fmus.native import c_toolchain
@@ -40,9 +40,9 @@ def test_machine_code_moves_as_python_does(by_python: CosimulationResult, monkey
 
     def watched(fmus: RobotFmus, *inputs: Any) -> CosimulationResult:
         sources.extend("sources/all.c" in ZipFile(path).namelist() for path in (fmus.platform, *fmus.cables))
-        return cosimulate(fmus, *inputs)
+        return run_cosimulation(fmus, *inputs)
 
-    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.cosimulate", watched)
+    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.run_cosimulation", watched)
     by_machine_code = motion()
     assert sources == [True] * 4
     assert np.max(np.abs(by_machine_code.position - by_python.position)) < 1e-9

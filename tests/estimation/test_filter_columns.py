@@ -21,7 +21,7 @@ def test_a_gap_is_filled_with_samples_that_measure_nothing() -> None:
     )
     outputs = np.hstack([gappy.position, gappy.tension])
     columns, is_recorded = filter_columns(gappy, outputs, np.zeros_like(outputs))
-    measured, observed, _, speed, later, step, *_ = columns
+    measured, observed, _, speed, later, _, step, *_ = columns
     # Four intervals, in steps of at most one and a half.
     assert list(np.flatnonzero(~is_recorded)) == [20, 21]
     assert step[0, :-1] == pytest.approx(np.where(np.isin(np.arange(58), [19, 20, 21]), 4.0 / 3.0 * STEP, STEP))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, run_cosimulation
 from tautwire.estimation import Trace, trace
 from tautwire.estimation.cosimulation_validation import output_errors
 from tautwire.estimation.disturbance import NEUTRAL
@@ -71,11 +71,11 @@ def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch:
     runs = []
 
     def astray(*arguments: Any, **options: Any) -> CosimulationResult:
-        motion = cosimulate(*arguments, **options)
+        motion = run_cosimulation(*arguments, **options)
         runs.append(motion)
         return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion
 
-    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.cosimulate", astray)
+    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.run_cosimulation", astray)
     found = traced()
     assert len(runs) == 4
     assert found.verdict == "unexplained"

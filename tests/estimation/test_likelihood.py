@@ -149,7 +149,7 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
     robot = robot.with_effect(effect.setting(robot))
     likelihood = Likelihood(robot, (), estimate_noise(robot, recording), 0.01)
     state, speeds = likelihood.start([])[0][:, None], np.full((8, 1), 0.02)
-    unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.full((1, 1), 0.01))
+    unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.zeros((16, 1)), np.full((1, 1), 0.01))
 
     def run(begun: np.ndarray) -> FilterResults:
         size = len(begun)

@@ -107,14 +107,14 @@ def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: 
     theta = np.array(list(case.law.values()))[:, None]
     start = np.array(Function("start", [model.parameters], [model.start])(theta))
     speeds = (recording.winch_speed[:count].T, recording.winch_speed[1 : count + 1].T)
-    step = np.diff(recording.time[: count + 1])[None, :]
+    bends, step = np.full((6, 1), 1e-3), np.diff(recording.time[: count + 1])[None, :]
     substeps = Substeps(5, 1)
     (constants,) = preparation_function(model, noise).call([start, theta, 0.02, []])[:1]
     moving, zero = (start, np.array(constants)), np.zeros((1, 1))
     for function, columns in (
         (output_function(model, 3, noise), (start, theta, np.zeros((6, 1)), *speeds, step, np.zeros((0, 1)))),
         (preparation_function(model, noise), (start, theta, step, np.zeros((0, 1)))),
-        (trajectory_function(model, 3, noise, substeps), (*moving, *speeds, step, zero)),
+        (trajectory_function(model, 3, noise, substeps), (*moving, *speeds, bends, step, zero)),
         (slope_function(model, 3, noise, substeps), (*moving, *speeds, zero)),
     ):
         arguments = [np.tile(a, count) if a.shape[1] == 1 else a for a in columns]

@@ -22,6 +22,7 @@ from . import (
     ComponentError,
     Experiment,
     FixedStep,
+    PiecewiseCubicInput,
     PiecewiseLinearInput,
     Recorder,
     RunStatistics,
@@ -87,6 +88,13 @@ class RecordedInputs:
     robot: Robot
     inputs: PiecewiseLinearInput
     notes: tuple[str, ...]
+
+
+def recorded_input(recording: Recording) -> PiecewiseLinearInput | PiecewiseCubicInput:
+    """The winch speeds of a recording: linear between samples, or cubic where it has their rates."""
+    if recording.winch_acceleration is None:
+        return PiecewiseLinearInput(recording.time, recording.winch_speed)
+    return PiecewiseCubicInput(recording.time, recording.winch_speed, recording.winch_acceleration)
 
 
 def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -> RecordedInputs:

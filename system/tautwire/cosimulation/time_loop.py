@@ -58,6 +58,31 @@ class PiecewiseLinearInput:
         return _interleave(start, slope), _interleave(start + step * slope, slope)
 
 
+@dataclass(frozen=True)
+class PiecewiseCubicInput:
+    """Cubic Hermite polynomials between samples, as pairs (value, rate) of each.
+
+    ``time`` has shape (N,), ``values`` and ``rates`` (N, k); the external inputs are value_1, rate_1, value_2 ...
+    """
+
+    time: Array
+    values: Array
+    rates: Array
+
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`InputSource`."""
+        begin, end = self._at(index, time), self._at(index, time + step)
+        return _interleave(*begin), _interleave(*end)
+
+    def _at(self, index: int, time: float) -> tuple[Array, Array]:
+        length = self.time[index + 1] - self.time[index]
+        s, change = (time - self.time[index]) / length, self.values[index + 1] - self.values[index]
+        b, c = (length * self.rates[row] - change for row in (index, index + 1))
+        value = self.values[index] + s * change + s * (1.0 - s) * ((1.0 - s) * b - s * c)
+        rate = change + (1.0 - s) * (1.0 - 3.0 * s) * b - s * (2.0 - 3.0 * s) * c
+        return value, rate / length
+
+
 def _interleave(values: Array, rates: Array) -> Array:
     pairs = np.empty(2 * len(values))
     pairs[0::2] = values

@@ -37,8 +37,9 @@ Array = NDArray[np.float64]
 class FilterInputs:
     """Inputs of a filter over K samples.
 
-    ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K), and
-    measured rotation (3, K), empty for a point mass, as ``columns``; the same for all samples are ``parameters``
+    ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), their bends (2 cables, K), time
+    step and drift (1, K), and measured rotation (3, K), empty for a point mass, as ``columns``; for the bends see
+    :mod:`tautwire.recordings.speed_interpolation`. The same for all samples are ``parameters``
     (p, 1), ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.process_function`), variances of white
     noise (m,), and the density of acceleration noise.
     """
@@ -132,7 +133,7 @@ class CompiledFilter:
 
     def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:
         """Run over K samples."""
-        measured, observed, shift, speed, later, step, drift, rotation = inputs.columns
+        measured, observed, shift, speed, later, bends, step, drift, rotation = inputs.columns
         output_count, count = measured.shape
         state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
@@ -141,7 +142,7 @@ class CompiledFilter:
         preparation = self._preparation.bind(count, state[:, None], theta, step, inputs.disturbance)
         constants, index = np.zeros_like(preparation.results[0]), np.zeros((1, 1))
         moving, middle = np.zeros((2, 1, self.model.states.numel() - self._constant_count))
-        part = self._trajectory.bind(count, moving.T, constants.T, speed, later, step, index)
+        part = self._trajectory.bind(count, moving.T, constants.T, speed, later, bends, step, index)
         slope = self._slopes.bind(count, middle.T, constants.T, speed, later, index)
         process = self._process.bind(count, step, drift, density, inputs.disturbance)
         parameter_rows = start.sensitivities.shape[1]

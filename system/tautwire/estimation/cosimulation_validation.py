@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.mathematics import REAL
 
-from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from ..cosimulation import Experiment
+from ..cosimulation.recording_simulation import recorded_input
+from ..cosimulation.robot_cosimulation import (
+    DEFAULT_STEP,
+    CosimulationResult,
+    run_cosimulation,
+    step_size_control_for,
+)
 from ..fmus.native.c_toolchain import NativeBuildError
 from ..fmus.packaging import RobotFmus, build_fmus
 from ..recordings.quaternion_columns import rotation_vectors
@@ -47,7 +54,9 @@ def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = _fastest_fmus(robot.as_modelled(), Path(folder))
         fmus = replace(fmus, relative_tolerance=DEFAULT_POLICY.cosimulation.relative_tolerance)
-        return as_tracked(robot, cosimulate(fmus, data.recording.time, data.recording.winch_speed))
+        time = data.recording.time
+        experiment = Experiment(recorded_input(data.recording), time, step_size_control_for(DEFAULT_STEP, None, time))
+        return as_tracked(robot, run_cosimulation(fmus, experiment))
 
 
 def _fastest_fmus(robot: Robot, folder: Path) -> RobotFmus:

@@ -126,7 +126,7 @@ def _derivatives_at_start(disturbance: DisturbanceStates) -> Derivatives:
 
 
 def _run_of(segment: FilterSegment) -> Run:
-    _, observed, _, _, _, step, *_ = segment.columns
+    _, observed, _, _, _, _, step, *_ = segment.columns
     results = segment.results
     values = np.where(observed.T > 0.0, results.values, 0.0)
     rows = (results.states.T, observed.T, step[0])

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
+from ..recordings.speed_interpolation import speed_bends
 
 Array = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def filter_columns(
     step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
     rows = np.append(0, np.cumsum(step_counts))
     time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
-    speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
+    speed, bends = _speeds_in_parts(recording, step_counts)
     measured_columns = np.zeros((measured.shape[1], len(time)))
     observed_columns, shift_columns = np.zeros_like(measured_columns), np.zeros_like(measured_columns)
     observed = np.isfinite(measured)
@@ -68,8 +69,32 @@ def filter_columns(
     is_recorded = np.zeros(len(time), dtype=bool)
     is_recorded[rows] = True
     rotation = _without_gaps(measured_columns, observed_columns, rotation_columns)
-    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :], rotation)
+    timing = (step[None, :], drift[None, :])
+    columns = (measured_columns, observed_columns, shift_columns, *speeds, bends, *timing, rotation)
     return tuple(np.asfortranarray(column) for column in columns), is_recorded
+
+
+def _speeds_in_parts(recording: Recording, part_counts: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Winch speeds (n, K) where each step is divided into equal parts, and both bends (2n, K) of the parts.
+
+    A polynomial's second derivative in a step is ``-4 b_0 - 2 b_1`` at its begin and ``2 b_0 + 4 b_1`` at its end, over
+    the step squared, and linear between; a part of the fraction f bends by f^2 of that.
+    """
+    part, count = np.repeat(np.arange(len(part_counts)), part_counts), np.repeat(part_counts, part_counts)[:, None]
+    first = np.concatenate([[0], np.cumsum(part_counts)[:-1]])
+    fraction = (np.arange(len(part)) - first[part])[:, None] / count
+    (begin, end), speed = speed_bends(recording), recording.winch_speed
+    start, change = speed[:-1][part], np.diff(speed, axis=0)[part]
+    begin, end = begin[part], end[part]
+    speeds = start + fraction * change + fraction * (1.0 - fraction) * ((1.0 - fraction) * begin - fraction * end)
+
+    def curvature(at: Array) -> Array:
+        return -(4.0 - 6.0 * at) * begin - (2.0 - 6.0 * at) * end
+
+    here, there = curvature(fraction), curvature(fraction + 1.0 / count)
+    scale = 1.0 / (6.0 * count**2)
+    bends = np.hstack([-scale * (2.0 * here + there), scale * (here + 2.0 * there)])
+    return np.vstack([speeds, speed[-1:]]).T, np.vstack([bends, np.zeros_like(bends[:1])]).T
 
 
 def _without_gaps(measured: Array, observed: Array, count: int) -> Array:

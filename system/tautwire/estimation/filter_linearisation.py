@@ -96,7 +96,7 @@ def linearise_filter(
     size = likelihood.model.states.numel()
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
-        _, observed, shift, speed, later, step, _, rotation = segment.columns
+        _, observed, shift, speed, later, _, step, _, rotation = segment.columns
         count = observed.shape[1]
         results, predicted = segment.results, segment.results.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0

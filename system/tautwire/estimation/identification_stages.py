@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import inf
 from operator import attrgetter
 
 from ..errors import UnreachableError
@@ -14,14 +15,16 @@ from .confusable_models import replace_by_confusable_models
 from .cosimulation_validation import compare_cosimulations, start_cosimulations, validate_by_cosimulation
 from .declared_start import with_declared_start
 from .discovery.unexplained_residual import UnexplainedResidual, explain_residual, resonances_beside_disturbance
+from .estimation_data import DataSplit
 from .explained_shares import explained_shares
 from .identification_state import Identification, with_final_robot
 from .localisation.component_localisation import localise_residual
 from .parameter_fit import NoFitError
 from .policy import TimeLimitPolicy
-from .preprocessing import with_disturbance
+from .preprocessing import with_disturbance, with_other_interpolation
 from .selection_result import without_least_evident
 from .smoothed_states import calibrated_robot
+from .speed_versions import split_with_other_interpolation
 from .stepwise_selection import select_effects
 from .verdict_stages import analyse_detectability, estimate_intervals, judge, share_out_what_was_missed
 
@@ -61,6 +64,33 @@ def select_in_corrected_recordings(state: Identification) -> Identification:
             state = start_side_runs(replace(state, context=context, prepared=prepared))
             state = replace(state, selection=select_effects(context))
     return state
+
+
+def select_with_other_interpolation(state: Identification) -> Identification:
+    """Select effects anew with winch speeds cubic between samples in place of linear, or the other way round.
+
+    Where these are far likelier under the effects selected: before, the largest effect decides which seem so.
+    """
+    split = split_with_other_interpolation(state.context.split) if state.context.fitter.has_disturbance else None
+    if split is None or not _is_far_likelier(state, split):
+        return state
+    prepared = with_other_interpolation(state.prepared, state.context.robot, split)
+    context = replace(state.context, fitter=prepared.fitter, split=split)
+    return select(start_side_runs(replace(state, context=context, prepared=prepared)))
+
+
+def _is_far_likelier(state: Identification, split: DataSplit) -> bool:
+    """Whether other data are far likelier under the selected effects, whose values are fitted anew."""
+    fitter, selection, least = state.context.fitter, state.selection, state.context.policy.preprocessing.min_speed_gain
+    robot, chosen, data = selection.fit.robot, selection.accepted, state.context.split.estimation
+    before = fitter.log_likelihood(robot, chosen, data)
+    if abs(fitter.log_likelihood(robot, chosen, split.estimation) - before) < least:
+        return False
+    try:
+        fit = fitter.fit_from([robot], chosen, split.estimation, -inf)
+    except (NoFitError, UnreachableError):
+        return False
+    return fitter.log_likelihood(fit.robot, chosen, split.estimation) - before >= least
 
 
 def try_confusable_models(state: Identification) -> Identification:
@@ -175,6 +205,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     begin_localisation,
     select,
     select_in_corrected_recordings,
+    select_with_other_interpolation,
     begin_localisation,
     try_confusable_models,
     try_declared_start,
@@ -195,6 +226,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
 SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[TimeLimitPolicy], float], str]] = {
     select: (attrgetter("selection"), "effects"),
     select_in_corrected_recordings: (attrgetter("selection"), "correcting clocks or winch speeds"),
+    select_with_other_interpolation: (attrgetter("selection"), "winch speeds interpolated otherwise"),
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import casadi
 import numpy as np
@@ -139,17 +138,16 @@ def trajectory_function(
 ) -> Function:
     """One of the equal parts of a step: moves the moving states by the method of Runge and Kutta.
 
-    Arguments: moving states, constants as :func:`preparation_function` gives them, speed, next speed, time step, and
-    the number of the part, from 0. Result: the moving states at its end.
+    Arguments: moving states, constants as :func:`preparation_function` gives them, speed, next speed, bends, time step,
+    and the number of the part, from 0. Result: the moving states at its end.
     """
     driven = disturbance_symbols(model, noise).driven(model)
     reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
-    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    index, count = SX.sym("index"), substeps.state
-    begin, end = (speed + (index + k) / count * (later - speed) for k in (0, 1))
+    interval, index = _Interval.of(cable_count), SX.sym("index")
     runge_kutta_step = _runge_kutta_step(reduced, cable_count)
-    moved = runge_kutta_step(reduced.states, reduced.parameters, begin, end, step / count)
-    arguments = [reduced.states, reduced.parameters, speed, later, step, index]
+    speeds = interval.speeds_in_part(index, substeps.state)
+    moved = runge_kutta_step(reduced.states, reduced.parameters, *speeds, interval.step / substeps.state)
+    arguments = [reduced.states, reduced.parameters, *interval.symbols, index]
     return Function("trajectory", arguments, [casadi.densify(moved)])
 
 
@@ -195,16 +193,17 @@ def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
     """Step of a simulation without noise: the state moves as in :func:`trajectory_function`.
 
-    Arguments: state, parameters, speed, next speed, time step. Results: state at the next sample (n,), and x, y, z,
-    the tensions and the rotation vector of this one without delay (m,).
+    Arguments: state, parameters, speed, next speed, bends, time step. Results: state at the next sample (n,), and
+    x, y, z, the tensions and the rotation vector of this one without delay (m,).
     """
-    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
+    interval = _Interval.of(cable_count)
     extended, theta = _with_statics_as_parameters(model), casadi.vertcat(model.parameters, model.static_values)
-    trajectory = _trajectory(extended, theta, model.states, _Interval(speed, later, step, substeps))
-    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
+    next_state = _moved(extended, theta, interval, substeps.state)
+    at_sample = casadi.densify(with_no_wrench(model, interval.speed))
+    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [at_sample])
     indices = model.indices
     shown = casadi.vertcat(outputs[:3], outputs[indices.tensions], outputs[indices.pose][3:])
-    return Function("simulation", [model.states, model.parameters, speed, later, step], [trajectory[-1], shown])
+    return Function("simulation", [model.states, model.parameters, *interval.symbols], [next_state, shown])
 
 
 def disturbance_symbols(model: SymbolicModel, noise: Noise) -> DisturbanceSymbols:
@@ -219,17 +218,36 @@ def with_no_wrench(model: SymbolicModel, speed: SX) -> SX:
 
 @dataclass(frozen=True)
 class _Interval:
-    """Interval between two samples: winch speeds at both ends, its length, and how it is divided."""
+    """Interval between two samples: winch speeds (n) at both ends, their ``bends`` (2n) between, and its length (s).
+
+    For the bends see :mod:`tautwire.recordings.speed_interpolation`.
+    """
 
     speed: SX
     next_speed: SX
+    bends: SX
     step: SX
-    substeps: Substeps
 
-    def parts(self, count: int) -> list[tuple[SX, SX]]:
-        """Winch speeds at both ends of each of some equal parts."""
-        points = [self.speed + (k / count) * (self.next_speed - self.speed) for k in range(count + 1)]
-        return list(pairwise(points))
+    @classmethod
+    def of(cls, cable_count: int) -> _Interval:
+        """New symbols for a number of cables."""
+        return cls(
+            SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("bends", 2 * cable_count), SX.sym("step")
+        )
+
+    @property
+    def symbols(self) -> list[SX]:
+        """All of them, in the order of their columns."""
+        return [self.speed, self.next_speed, self.bends, self.step]
+
+    def speeds_in_part(self, index: SX | int, count: int) -> list[SX]:
+        """Winch speeds at the begin, in the middle, and at the end of one of some equal parts."""
+        begin_bend, end_bend = casadi.vertsplit(self.bends, self.speed.numel())
+        fractions = ((index + share) / count for share in (0.0, 0.5, 1.0))
+        return [
+            self.speed + f * (self.next_speed - self.speed) + f * (1.0 - f) * ((1.0 - f) * begin_bend - f * end_bend)
+            for f in fractions
+        ]
 
 
 def _statics_at(model: SymbolicModel, theta: SX) -> tuple[SX, SX]:
@@ -247,23 +265,22 @@ def _with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
     )
 
 
-def _trajectory(model: SymbolicModel, theta: SX, state: SX, interval: _Interval) -> list[SX]:
-    """States at the ends of the parts of a step, from its begin on."""
-    runge_kutta_step = _runge_kutta_step(model, interval.speed.numel())
-    trajectory, steps = [state], interval.substeps.state
-    for begin, end in interval.parts(steps):
-        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / steps))
-    return trajectory
+def _moved(model: SymbolicModel, theta: SX, interval: _Interval, part_count: int) -> SX:
+    """The states at the end of an interval that is integrated in equal parts."""
+    runge_kutta_step, states = _runge_kutta_step(model, interval.speed.numel()), model.states
+    for index in range(part_count):
+        speeds = interval.speeds_in_part(index, part_count)
+        states = runge_kutta_step(states, theta, *speeds, interval.step / part_count)
+    return states
 
 
 def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:
     rates = Function("rates", [model.states, model.inputs, model.parameters], [model.rates])
-    begin, end, step = SX.sym("begin", cable_count), SX.sym("end", cable_count), SX.sym("step")
-    at_begin, at_end = with_no_wrench(model, begin), with_no_wrench(model, end)
-    middle = 0.5 * (at_begin + at_end)
+    speeds, step = [SX.sym(name, cable_count) for name in ("begin", "middle", "end")], SX.sym("step")
+    at_begin, in_middle, at_end = (with_no_wrench(model, each) for each in speeds)
     k1 = rates(model.states, at_begin, model.parameters)
-    k2 = rates(model.states + 0.5 * step * k1, middle, model.parameters)
-    k3 = rates(model.states + 0.5 * step * k2, middle, model.parameters)
+    k2 = rates(model.states + 0.5 * step * k1, in_middle, model.parameters)
+    k3 = rates(model.states + 0.5 * step * k2, in_middle, model.parameters)
     k4 = rates(model.states + step * k3, at_end, model.parameters)
     next_state = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-    return Function("runge_kutta_step", [model.states, model.parameters, begin, end, step], [next_state])
+    return Function("runge_kutta_step", [model.states, model.parameters, *speeds, step], [next_state])

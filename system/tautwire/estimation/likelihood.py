@@ -177,11 +177,9 @@ class Likelihood:
         """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds."""
         nothing = np.zeros((recording.sample_count, output_count(self.model)))
         columns, is_recorded = filter_columns(recording, nothing, nothing)
-        theta, (speed, later, step) = self.arguments(parameters), columns[3:6]
+        theta, interval = self.arguments(parameters), columns[3:7]
         start, _ = self._filter_functions.start(theta)
-        _, outputs = self._filter_functions.simulation(
-            len(is_recorded), np.array(start), theta[:, None], speed, later, step
-        )
+        _, outputs = self._filter_functions.simulation(len(is_recorded), np.array(start), theta[:, None], *interval)
         lags = np.array(self._filter_functions.lags(theta)).ravel()
         time, shown = recording.time, outputs[:, is_recorded]
         rows = np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T

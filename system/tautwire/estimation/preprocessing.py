@@ -39,7 +39,7 @@ from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, IdentificationPolicy, ResidualAnalysisPolicy
 from .preprocessing_policy import PreprocessingPolicy
 from .residual_analysis import has_enough_samples, residuals_are_white
-from .speed_versions import speed_versions
+from .speed_versions import speed_versions, split_with_other_interpolation
 from .worker_pool import WorkerPool
 
 
@@ -150,7 +150,7 @@ def prepare_data(
     prepared = prepare_recordings(robot, fit, check, policy.preprocessing)
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.poll_interrupts, policy.fit)
-    fitter = with_fitted_disturbance(fitter, robot, (), data_split.estimation)
+    fitter, data_split = _with_likely_interpolation(fitter, robot, data_split, policy.preprocessing)
     _require_samples(innovations_of(fitter, robot, data_split), data_split, policy.residual_analysis)
 
     def assembled(fitter: Fitter, data_split: DataSplit, notes: tuple[str, ...]) -> PreparedData:
@@ -171,6 +171,36 @@ def prepare_data(
     clock_corrected = assembled(fitter, data_split, (*notes, *clock_notes))
     explained = all_residuals_white(clock_corrected.innovations, data_split, policy.residual_analysis)
     return (clock_corrected,) if explained else (first, *others, clock_corrected)
+
+
+def _with_likely_interpolation(
+    fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
+) -> tuple[Fitter, DataSplit]:
+    """The disturbance fitted to FIT, with winch speeds cubic between samples unless linear ones are far likelier.
+
+    Speeds of a real robot are samples of a smooth motion. Without a disturbance they stay linear, as those of a
+    simulation are.
+    """
+    smooth = split_with_other_interpolation(split) if fitter.has_disturbance else None
+    if smooth is None:
+        return with_fitted_disturbance(fitter, robot, (), split.estimation), split
+    fitter = with_fitted_disturbance(fitter, robot, (), smooth.estimation)
+    gain = fitter.log_likelihood(robot, (), split.estimation) - fitter.log_likelihood(robot, (), smooth.estimation)
+    measured = np.isfinite(split.estimation.recording.measured()[split.estimation.rows])
+    if gain <= policy.min_linear_gain * int(np.sum(measured)):
+        return fitter, smooth
+    return with_fitted_disturbance(fitter, robot, (), split.estimation), split
+
+
+def with_other_interpolation(prepared: PreparedData, robot: Robot, split: DataSplit) -> PreparedData:
+    """The same data as ``split`` has them, with winch speeds interpolated otherwise, and a note."""
+    fitter = with_fitted_disturbance(prepared.fitter, robot, (), split.estimation)
+    data_sets = (split.estimation, split.validation)[: len(prepared.data_sets)]
+    recording = split.estimation.recording
+    kind = "linear" if recording.winch_acceleration is None else "cubic"
+    note = f"{recording.path}: winch speeds are {kind} between samples, which is likelier under the effects found"
+    innovations = innovations_of(fitter, robot, split)
+    return PreparedData(split, data_sets, fitter, innovations, (*prepared.notes, note))
 
 
 def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:

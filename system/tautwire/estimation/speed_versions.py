@@ -1,4 +1,4 @@
-"""Versions of winch speeds: as recorded, or those of the encoders behind them, with the errors that these leave."""
+"""Versions of winch speeds: linear or cubic between samples, or those of the encoders behind them with their errors."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from ..recordings.central_differences import may_be_central_differences, with_speeds_between_samples
 from ..recordings.recording import Recording
 from ..recordings.rope_length_smoothing import LengthSmoothing, with_smoothed_lengths
+from ..recordings.speed_interpolation import with_linear_speeds, with_spline_speeds
 from ..robot.schema import Robot
 from .disturbance import OrnsteinUhlenbeck
 from .disturbance_fit import with_fitted_disturbance
@@ -17,6 +18,23 @@ from .estimation_data import DataSplit
 from .kalman_filter import Noise
 from .parameter_fit import Fitter
 from .preprocessing_policy import PreprocessingPolicy
+
+
+def split_with_other_interpolation(split: DataSplit) -> DataSplit | None:
+    """The data with winch speeds cubic between samples in place of linear, or the other way round.
+
+    None where the speeds are an encoder's: see :func:`speed_versions` for these.
+    """
+    fit, check = split.estimation.recording, split.validation.recording
+    if may_be_central_differences(fit):
+        return None
+    interpolated = with_spline_speeds if fit.winch_acceleration is None else with_linear_speeds
+    other = interpolated(fit)
+    return replace(
+        split,
+        estimation=replace(split.estimation, recording=other),
+        validation=replace(split.validation, recording=other if check is fit else interpolated(check)),
+    )
 
 
 def speed_versions(

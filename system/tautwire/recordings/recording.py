@@ -47,6 +47,8 @@ class Recording:
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
     the winch speed is its rate. None where no cable has one. ``orientation`` (N, 4) is the unit quaternion w, x, y, z
     from the platform's frame to the world, its sign continuous along time; NaN where it was not measured, the default.
+    ``winch_acceleration`` (N, n) in m/s^2 are the rates of the winch speeds where these are cubic between samples, see
+    :mod:`tautwire.recordings.speed_interpolation`; None where they are linear, as those read from a file.
     ``columns`` are the names, units and scales of columns in the file, by their standard names, where it has any;
     ``has_time_column`` unless times are clock times, or those of the file's format.
     """
@@ -62,6 +64,7 @@ class Recording:
     orientation: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
     columns: Mapping[str, RecordedColumn] = field(default_factory=dict)
     has_time_column: bool = True
+    winch_acceleration: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if not self.has_orientation:
@@ -134,6 +137,7 @@ class Recording:
             position=self.position[rows],
             orientation=self.orientation[rows],
             rope_length=None if self.rope_length is None else self.rope_length[rows],
+            winch_acceleration=None if self.winch_acceleration is None else self.winch_acceleration[rows],
         )
 
     def measured(self) -> NDArray[np.float64]:
@@ -143,16 +147,23 @@ class Recording:
     def wound_lengths(self) -> NDArray[np.float64]:
         """Lengths of rope that the winches have reeled in since the first sample, shape (N, n), in m."""
         wound = np.zeros_like(self.winch_speed)
-        mean_speeds = 0.5 * (self.winch_speed[1:] + self.winch_speed[:-1])
-        np.cumsum(mean_speeds * np.diff(self.time)[:, None], axis=0, out=wound[1:])
+        steps = np.diff(self.time)[:, None]
+        travel = 0.5 * steps * (self.winch_speed[1:] + self.winch_speed[:-1])
+        if self.winch_acceleration is not None:
+            travel -= steps**2 / 12.0 * np.diff(self.winch_acceleration, axis=0)
+        np.cumsum(travel, axis=0, out=wound[1:])
         return wound
 
     def with_winch_speed(self, winch_speed: NDArray[np.float64]) -> "Recording":
-        """The recording with other winch speeds (N, n), without the recorded lengths of cables whose speeds differ."""
+        """The recording with other winch speeds (N, n), linear between samples.
+
+        Without the recorded lengths of cables whose speeds differ.
+        """
+        other = replace(self, winch_speed=winch_speed, winch_acceleration=None)
         if self.rope_length is None:
-            return replace(self, winch_speed=winch_speed)
+            return other
         is_same = np.all(winch_speed == self.winch_speed, axis=0)
-        return replace(self, winch_speed=winch_speed, rope_length=np.where(is_same, self.rope_length, np.nan))
+        return replace(other, rope_length=np.where(is_same, self.rope_length, np.nan))
 
     def frame(self) -> pd.DataFrame:
         """The recording as a table with the columns of a recording file, NaN where missing; orientation if measured."""

@@ -41,11 +41,16 @@ class CableSimulation:
         return np.linalg.norm(self.sensitivities[:, :3], axis=1)
 
 
-def simulate_cable(name: str, fmu: FilePath, path: SmoothedPath, winch_speed: Array) -> CableSimulation:
-    """Simulate a cable FMU from sample to sample along a path, winch speeds (N,) in m/s; raises ComponentError."""
-    time = path.time
-    # Speeds are linear between samples: their rate jumps at each.
-    rates = np.append(0.0, np.diff(winch_speed) / np.diff(time))
+def simulate_cable(
+    name: str, fmu: FilePath, path: SmoothedPath, winch_speed: Array, winch_acceleration: Array | None = None
+) -> CableSimulation:
+    """Simulate a cable FMU from sample to sample along a path, winch speeds (N,) in m/s; raises ComponentError.
+
+    Speeds are linear between samples, where their rate jumps, or cubic with the rates (N,) in m/s^2.
+    """
+    time, rates = path.time, winch_acceleration
+    if rates is None:
+        rates = np.append(0.0, np.diff(winch_speed) / np.diff(time))
     input_rows = np.hstack([path.position, path.velocity, winch_speed[:, None], path.acceleration, rates[:, None]])
     results = np.empty((len(time), len(OUTPUTS)))
     linearised_rows = np.unique(np.linspace(0, len(time) - 1, min(MAX_LINEARISATIONS, len(time))).astype(int))
@@ -57,7 +62,7 @@ def simulate_cable(name: str, fmu: FilePath, path: SmoothedPath, winch_speed: Ar
         component.initialize(float(time[0]), {})
         component.run()
         for row, input_values in enumerate(input_rows):
-            if row:
+            if row and winch_acceleration is None:
                 next_rate.values[0] = rates[row]
                 component.write(next_rate)
             inputs.values[0], inputs.values[1:] = time[row], input_values

@@ -60,9 +60,10 @@ def _evaluate_components(
 ) -> FaultLocalisation:
     """Residuals of the cables, then of the platform where all tensions are measured, and the verdict on both."""
     recording, path, numbers = measured.recording, measured.path, measured.robot.cable_numbers
+    rates = [None] * len(numbers) if recording.winch_acceleration is None else recording.winch_acceleration.T
     runs = [
-        simulate_cable(f"cable_{number}", fmu, path, speed)
-        for number, fmu, speed in zip(numbers, fmus.cables, recording.winch_speed.T, strict=True)
+        simulate_cable(f"cable_{number}", fmu, path, speed, rate)
+        for number, fmu, speed, rate in zip(numbers, fmus.cables, recording.winch_speed.T, rates, strict=True)
     ]
     has_tension = np.sum(np.isfinite(recording.tension), axis=0) >= MIN_MEASURED_SAMPLES
     cables = [

@@ -1,0 +1,124 @@
+"""Winch speeds that are samples of a smooth motion, against the rig, which moves smoothly between samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation import identification, trace
+from tautwire.estimation.cosimulation_validation import cosimulate_data_set
+from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.policy import DEFAULT_POLICY
+from tautwire.estimation.preprocessing import prepare_data
+from tautwire.estimation.speed_versions import split_with_other_interpolation
+from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.recordings.recording import Recording
+from tautwire.recordings.speed_interpolation import with_spline_speeds
+from tautwire.robot.schema import AXES
+from tests.rig import SampledProgram, load_robot, make_recording, wander
+from tests.rig.robot import Noise
+from tests.support.recordings import REACH
+from tests.support.robots import EXAMPLES, example
+
+RATE = 50.0
+RIG_ROBOT = load_robot(EXAMPLES / "three" / "robot.toml")
+NOISE = RIG_ROBOT.noise
+PRECISE = replace(NOISE, position=1e-6, tension=1e-2, winch_speed=1e-7)
+THREE = example("three")
+SURVEYED = replace(THREE, cables=tuple(replace(cable, anchor_uncertainty=1e-4) for cable in THREE.cables))
+
+PRECISELY_MEASURED = replace(
+    SURVEYED, sensors=replace(THREE.sensors, position_noise=1e-6, tension_noise=1e-2, winch_speed_noise=1e-7)
+)
+
+
+def shaken(
+    is_smooth: bool, seed: int = 1, duration: float = 8.0, damping: float | None = None, noise: Noise | None = NOISE
+) -> Recording:
+    """Winches that vibrate, smoothly between samples or linearly."""
+    robot = replace(RIG_ROBOT, noise=noise or NOISE)
+    smooth = wander(robot, seed, REACH["three"], slow=(5.0, 12.0), shake=0.6)
+    times = np.arange(round(duration * RATE) + 1) / RATE
+    linear = SampledProgram(times, np.array([smooth.speed(float(time)) for time in times]))
+    frame = make_recording(
+        robot,
+        {"damping": {"damping": damping}} if damping else {},
+        smooth if is_smooth else linear,
+        duration=duration,
+        rate=RATE,
+        seed=seed,
+        noise=noise is not None,
+    )
+    speeds, tensions = ([f"{name}_{i}" for i in (1, 2, 3)] for name in ("winch_speed", "tension"))
+    columns = [frame[names].to_numpy(dtype=float) for names in (speeds, tensions, list(AXES))]
+    return Recording(f"shaken-{seed}.csv", frame["time"].to_numpy(dtype=float), *columns)
+
+
+def test_filter_and_fmus_move_with_a_smooth_motion_as_the_rig_does() -> None:
+    measured = shaken(True, noise=None)
+    likelihood = Likelihood(THREE, (), estimate_noise(THREE, measured), 1.0 / RATE)
+    errors = {}
+    for name, recording in (("linear", measured), ("cubic", with_spline_speeds(measured))):
+        simulated = likelihood.simulated_outputs(recording, [])
+        data = DataSet(recording, THREE.platform.start, np.ones(recording.sample_count, dtype=bool))
+        motion = cosimulate_data_set(THREE, data)
+        errors[name] = [float(np.max(np.abs(each.position - measured.position))) for each in (simulated, motion)]
+        errors[name] += [float(np.max(np.abs(each.tension - measured.tension))) for each in (simulated, motion)]
+    assert all(cubic < 0.1 * linear for cubic, linear in zip(errors["cubic"], errors["linear"], strict=True)), errors
+
+
+def split_of(fit: Recording, check: Recording) -> DataSplit:
+    fit_data, check_data = (
+        DataSet(each, THREE.platform.start, np.ones(each.sample_count, dtype=bool)) for each in (fit, check)
+    )
+    return DataSplit(fit_data, check_data, ())
+
+
+def test_the_other_interpolation_is_that_of_both_recordings() -> None:
+    recording = shaken(True, noise=None, duration=2.0)
+    other = split_with_other_interpolation(split_of(recording, recording))
+    assert other is not None and other.estimation.recording.winch_acceleration is not None
+    assert other.validation.recording is other.estimation.recording
+    back = split_with_other_interpolation(other)
+    assert back is not None and back.estimation.recording.winch_acceleration is None
+
+
+def test_speeds_of_an_encoder_have_no_other_interpolation() -> None:
+    recording = shaken(True, noise=None, duration=2.0)
+    counted = replace(recording, winch_speed=np.round(recording.winch_speed, 2))
+    assert split_with_other_interpolation(split_of(counted, counted)) is None
+
+
+def test_speeds_of_a_surveyed_robot_are_samples_of_a_smooth_motion() -> None:
+    recordings = shaken(True, 1), shaken(True, 2)
+    surveyed, *_ = prepare_data(SURVEYED, *recordings, WorkerPool(1))
+    assert all(data.recording.winch_acceleration is not None for data in surveyed.data_sets)
+    exact, *_ = prepare_data(THREE, *recordings, WorkerPool(1))
+    assert all(data.recording.winch_acceleration is None for data in exact.data_sets)
+
+
+def test_speeds_that_are_clearly_linear_stay_so() -> None:
+    for is_smooth in (False, True):
+        recordings = (shaken(is_smooth, seed, noise=PRECISE) for seed in (1, 2))
+        prepared, *_ = prepare_data(PRECISELY_MEASURED, *recordings, WorkerPool(1))
+        is_cubic = prepared.split.estimation.recording.winch_acceleration is not None
+        assert is_cubic == is_smooth
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("is_smooth", [True, False])
+def test_interpolation_is_judged_again_under_the_effects_found(
+    monkeypatch: pytest.MonkeyPatch, is_smooth: bool
+) -> None:
+    """It begins with the wrong one."""
+    threshold = -np.inf if is_smooth else np.inf
+    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_linear_gain=threshold)
+    monkeypatch.setattr(
+        identification, "policy_within", lambda seconds: replace(DEFAULT_POLICY, preprocessing=wrong_first)
+    )
+    result = trace(PRECISELY_MEASURED, *(shaken(is_smooth, seed, damping=6e9, noise=PRECISE) for seed in (1, 2)))
+    assert [effect.name for effect in result.effects] == ["damping"]
+    kind = "cubic" if is_smooth else "linear"
+    assert [note for note in result.notes if f"winch speeds are {kind} between samples" in note]
