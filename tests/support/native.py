@@ -9,6 +9,21 @@ import numpy as np
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Robot
+from tests.support.effect_cases import DELAYED, SEVERAL, Case, same
+from tests.support.effects import with_effects
+from tests.support.rigid_robots import crane_robot
+from tests.support.robots import LIMITED, example, with_winch
+
+# Robots whose FMUs are held against derivatives of the laws.
+DIFFERENTIATED = {
+    "plain": example("three"),
+    "several": with_winch(with_effects(example("three"), *SEVERAL), LIMITED),
+    "delayed": with_effects(example("three"), *SEVERAL, DELAYED),
+    "rigid": crane_robot()
+    .with_effect(Case("payload", {}, {"mass": 10.0, "x": 0.1, "y": 0.2, "z": -0.1}).setting(crane_robot()))
+    .with_effect(same("attachment", 2, x=0.02, z=-0.03).setting(crane_robot()))
+    .with_effect(same("rotational_drag", damping=20.0).setting(crane_robot())),
+}
 
 
 def both_kinds(robot: Robot, folder: Path) -> tuple[RobotFmus, RobotFmus]:

@@ -20,23 +20,11 @@ from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import winch_drive
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, COMPLEX_STEP_SIZE
 from tautwire_fmu.slave import Slave
-from tests.support.effect_cases import DELAYED, SEVERAL, Case, same
-from tests.support.effects import with_effects
 from tests.support.fmus import Hand, in_hand
-from tests.support.rigid_robots import crane_robot
-from tests.support.robots import LIMITED, example, with_winch
+from tests.support.native import DIFFERENTIATED
 
 Array = NDArray[np.float64]
 
-ROBOTS = {
-    "plain": example("three"),
-    "several": with_winch(with_effects(example("three"), *SEVERAL), LIMITED),
-    "delayed": with_effects(example("three"), *SEVERAL, DELAYED),
-    "rigid": crane_robot()
-    .with_effect(Case("payload", {}, {"mass": 10.0, "x": 0.1, "y": 0.2, "z": -0.1}).setting(crane_robot()))
-    .with_effect(same("attachment", 2, x=0.02, z=-0.03).setting(crane_robot()))
-    .with_effect(same("rotational_drag", damping=20.0).setting(crane_robot())),
-}
 PATH = Line((28.86, 0.0, 5.0), (29.5, 0.7, 6.2), 2.0)
 FMI_WARNING = 1
 STEP = 0.02
@@ -53,7 +41,7 @@ def fmus_of(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], RobotFm
 
     def fmus(name: str) -> RobotFmus:
         if name not in built:
-            built[name] = build_fmus(ROBOTS[name], tmp_path_factory.mktemp(name), native=True)
+            built[name] = build_fmus(DIFFERENTIATED[name], tmp_path_factory.mktemp(name), native=True)
         return built[name]
 
     return fmus
@@ -130,7 +118,7 @@ def test_those_of_a_cable_are_those_of_its_law(
         if inputs_are_set:
             shake(cable, CABLE_MOTION)
         assert cable.get("pull")[0] > 100.0
-        data = cable_resources(ROBOTS[name])[1]
+        data = cable_resources(DIFFERENTIATED[name])[1]
         slave = twin_of(cable, "cable", "Cable", data, 0.0 if inputs_are_set else STEP)
         shown, expected = cable.jacobian(), np.zeros((18, 22))
         expected[:12, MOTION] = derivatives_of_cable(slave)
@@ -169,7 +157,7 @@ def test_those_of_a_platform_are_those_of_its_law(
         shake(platform, {"force": 300.0, "external": 200.0})
         platform.step(0.0, STEP)
         shake(platform, {"force": 300.0, "external": 200.0})
-        slave = twin_of(platform, kind, base, platform_resource(ROBOTS[name]), 0.0)
+        slave = twin_of(platform, kind, base, platform_resource(DIFFERENTIATED[name]), 0.0)
         shown, expected = platform.jacobian(), derivatives_of_platform(slave)
     assert_exact(shown, expected)
     assert np.count_nonzero(shown) > 10
@@ -185,7 +173,7 @@ def test_those_of_a_winch_are_those_of_its_law(is_limited: bool, fmus_of: Callab
         winch.step(0.0, STEP)
         command = 0.6 if is_limited else winch.get("winch_speed")[0] + 0.005
         winch.set(speed_command=command)
-        slave = twin_of(winch, "winch", "Winch", winch_resource(ROBOTS["several"], 1), 0.0)
+        slave = twin_of(winch, "winch", "Winch", winch_resource(DIFFERENTIATED["several"], 1), 0.0)
         state = winch_drive.DriveState(*slave.real[slave.states])
         stepped = command + 1j * COMPLEX_STEP_SIZE
         values = [
@@ -248,7 +236,7 @@ def test_a_load_cell_that_lags_shows_no_inputs_of_now(fmus_of: Callable[[str], R
 
 
 def test_those_of_a_sampled_controller_are_zero(tmp_path: Path) -> None:
-    path = build_native_controller_fmu(ROBOTS["plain"], Feedforward(3), PATH, 2.5, tmp_path)
+    path = build_native_controller_fmu(DIFFERENTIATED["plain"], Feedforward(3), PATH, 2.5, tmp_path)
     with in_hand(path) as controller:
         controller.run()
         controller.step(0.0, STEP)

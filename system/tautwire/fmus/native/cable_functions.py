@@ -32,25 +32,30 @@ def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
     """``cable_start``, ``cable_rates``, ``cable_outputs``, ``cable_derivative`` and ``cable_indicators`` of a resource.
 
     ``start`` are what follows from the parameters: length, direction, sensor delay, whether effects' states
-    move, and tension at the load cell behind a filter.
+    move, and tension at the load cell behind a filter. The derivative is that of outputs and rates.
     """
     cable = _Cable(data)
+    known, varying = {"motion": MOTION_SIZE, **cable.known}, ("motion", "states")
     return (
         *cable.shared_functions(),
-        trace_function("cable_rates", {"motion": MOTION_SIZE, **cable.known}, cable.rates),
-        trace_kinks("cable_indicators", {"motion": MOTION_SIZE, **cable.known}, cable.kinks, ("motion", "states")),
+        trace_function("cable_rates", known, cable.rates),
+        trace_derivative("cable_derivative", known, cable.outputs_and_rates, varying),
+        trace_kinks("cable_indicators", known, cable.kinks, varying),
     )
 
 
 def whole_robot_cable_functions(data: Mapping[str, Any], kind: int) -> tuple[TracedFunction, ...]:
     """As :func:`cable_functions`, with the number of the ``kind`` behind the names.
 
-    In place of the rates there is ``cable_action``: rates of the states, and the force on the platform.
+    In place of the rates there is ``cable_action``: rates of the states, and the force on the platform. The derivative
+    is that of the outputs, with the states held.
     """
     cable, suffix = _Cable(data), f"_{kind}"
+    motion = {"motion": MOTION_SIZE, **cable.known}
     return (
         *cable.shared_functions(suffix),
         trace_function(f"cable_action{suffix}", {"end": END_SIZE, "speed": 1, **cable.known}, cable.action),
+        trace_derivative(f"cable_derivative{suffix}", motion, cable.outputs, ("motion",)),
     )
 
 
@@ -71,7 +76,6 @@ class _Cable:
         return (
             trace_function(f"cable_start{suffix}", {"parameters": self.known["parameters"]}, self.start),
             trace_function(f"cable_outputs{suffix}", motion, self.outputs),
-            trace_derivative(f"cable_derivative{suffix}", motion, self.outputs, "motion"),
         )
 
     def start(self, m: Mathematics, columns: Columns) -> Columns:
@@ -121,6 +125,10 @@ class _Cable:
             "outputs": [*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull],
             "output_rates": rates_along([*shown.force, shown.tension], varying, varying_rates),
         }
+
+    def outputs_and_rates(self, m: Mathematics, columns: Columns) -> Columns:
+        """All outputs, then the rates of the states."""
+        return {**self.outputs(m, columns), **self.rates(m, columns)}
 
     def kinks(self, m: Mathematics, columns: Columns) -> Columns:
         """The pull, at whose zeros the cable falls slack or becomes taut; tracing finds all other kinks."""

@@ -64,6 +64,8 @@ def _model_exchange(fmi2: Element) -> list[Element]:
                 "canBeInstantiatedOnlyOncePerProcess": "false",
                 "canGetAndSetFMUState": "true",
                 "canSerializeFMUState": "true",
+                "providesDirectionalDerivatives": former.attrib["providesDirectionalDerivative"],
+                "providesAdjointDerivatives": "true",
                 "needsCompletedIntegratorStep": "true",
             },
         )

@@ -11,6 +11,11 @@ from tautwire_fmu.units import UNITS
 
 RATE_UNITS = {"1": "1/s", "s": "1", "m": "m/s", "m/s": "m/s2", "m/s2": "m/s3", "N m s": "N m"}
 MIDDLE_PREFIX = "middle_"
+# Of an output the parameter of its lag, and the rate that the curve to now goes through where a step is longer than it.
+LATE_OUTPUTS = {
+    "tension": ("effect.sensor_delay.tension_delay", "tension_rate"),
+    **{f"measured_position.{axis}": ("effect.sensor_delay.position_delay", f"acceleration.{axis}") for axis in "xyz"},
+}
 
 
 def further_variables(slave: Slave, indicator_count: int) -> tuple[Variable, ...]:
@@ -37,7 +42,7 @@ def add_model_exchange(root: Element, slave: Slave, further: Sequence[Variable],
         "canNotUseMemoryManagementFunctions": "true",
         "canGetAndSetFMUstate": "true",
         "canSerializeFMUstate": "true",
-        "providesDirectionalDerivative": "false",
+        "providesDirectionalDerivative": "true",
     }
     interface = Element("ModelExchange", options)
     SubElement(SubElement(interface, "SourceFiles"), "File", {"name": source_file})
@@ -81,9 +86,10 @@ def _complete_structure(root: Element, slave: Slave, state_count: int) -> None:
     structure, outputs, unknowns = (root.find(f"ModelStructure{part}") for part in ("", "/Outputs", "/InitialUnknowns"))
     assert structure is not None and outputs is not None and unknowns is not None
     states = range(slave.states.start + 1, slave.states.stop + 1)
+    inputs_of = {int(each.attrib["index"]): set(map(int, each.attrib["dependencies"].split())) for each in outputs}
     for output in outputs:
         place = int(output.attrib["index"])
-        inputs = map(int, output.attrib["dependencies"].split())
+        inputs = inputs_of[place] | inputs_of.get(_rate_shown_late(slave, place), set())
         known = [place] if place in states else sorted({*inputs, *states})
         if not slave.variables[place - 1].name.startswith(MIDDLE_PREFIX):
             output.set("dependencies", " ".join(map(str, known)))
@@ -94,3 +100,10 @@ def _complete_structure(root: Element, slave: Slave, state_count: int) -> None:
     structure.insert(list(structure).index(outputs) + 1, derivatives)
     first = {int(unknown.attrib["index"]) for unknown in unknowns}
     unknowns[:] = [Element("Unknown", {"index": str(place)}) for place in sorted({*first, *states, *rates})]
+
+
+def _rate_shown_late(slave: Slave, place: int) -> int:
+    """Place of the rate on which an output depends too where its sensor lags; 0 where there is none."""
+    places = {variable.name: each for each, variable in enumerate(slave.variables, start=1)}
+    lag, rate = LATE_OUTPUTS.get(slave.variables[place - 1].name, ("", ""))
+    return places.get(rate, 0) if lag in places else 0

@@ -23,17 +23,18 @@ def mass_functions(data: Mapping[str, Any], first_effect_parameter: int) -> tupl
 
     ``first_effect_parameter`` parameters come before those of the effects, mass and gravity first. ``sensor`` is gain,
     offset and delay of the measured position; a node the acceleration of the mass and its rate; the derivative that of
-    the acceleration with respect to the force.
+    the acceleration with respect to motion, force and time.
     """
     effects = effects_from_resource(dict(data))
     parameters = first_effect_parameter + sum(len(effect.parameters) for effect in effects)
     mass = Mass(effects, first_effect_parameter)
     known = {"mass": 6, "force_and_rate": 6, "time": 1, "parameters": parameters}
+    varying = ("mass", "force_and_rate", "time")
     return (
         trace_function("platform_sensor", {"parameters": parameters}, mass.sensor),
         trace_function("platform_node", known, mass.node),
-        trace_derivative("platform_derivative", known, mass.acceleration, "force_and_rate"),
-        trace_kinks("platform_indicators", known, mass.acceleration, ("mass", "force_and_rate", "time")),
+        trace_derivative("platform_derivative", known, mass.acceleration, varying),
+        trace_kinks("platform_indicators", known, mass.acceleration, varying),
     )
 
 

@@ -48,8 +48,6 @@ from .traced_functions import Columns, TracedFunction, derivative_along, trace_d
 ATTITUDE_SIZE = 15
 # Moment matrix of the forces and its rate, then the external moment and its rate.
 LOAD_SIZE = 24
-# A load, and the acceleration of the centre of mass under it.
-ACTION_SIZE = LOAD_SIZE + 3
 AXES_SIZE = 9
 START_MOTION_SIZE = 6
 SYMMETRIC = {frozenset(entry): index for index, entry in enumerate(INERTIA_ENTRIES)}
@@ -68,6 +66,7 @@ def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
     turning = {"quaternion": 4, "momentum": 3}
     start = {"parameters": body.parameter_count, "principal_axes": AXES_SIZE, "motion": START_MOTION_SIZE}
     points = {**attitude, "mass": 9, "start": sizes["start"]}
+    moving = {**turning, **load, "mass": 9}
     return (
         *mass_functions(data, body.first_effect_parameter),
         trace_function("body_start", start, body.start),
@@ -75,7 +74,7 @@ def rigid_body_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("body_moment", {**attitude, **load, **sizes}, body.moment),
         trace_function("body_points", points, body.points),
         trace_function("quaternion_rate", {"quaternion": 4, **attitude}, _quaternion_rate),
-        trace_derivative("body_derivative", {**turning, "action": ACTION_SIZE, **sizes}, body.reaction, "action"),
+        trace_derivative("body_derivative", {**moving, **sizes}, body.response, tuple(moving)),
         *_step_functions(body, "two_node", 1, sizes),
         *_step_functions(body, "three_node", 2, sizes),
     )
@@ -155,11 +154,12 @@ class RigidBody:
         ]
         return {"points": [*points, *law.transform(rotation, velocity), *law.transform(rotation, acceleration)]}
 
-    def reaction(self, m: Mathematics, columns: Columns) -> Columns:
-        """Points as :meth:`points` has them, with the centre of mass at rest in the origin, under an action."""
-        load, acceleration = columns["action"][:LOAD_SIZE], columns["action"][LOAD_SIZE:]
-        attitude = self._attitude(m, columns, columns["quaternion"], columns["momentum"], load)
-        return self.points(m, {**columns, "attitude": attitude, "mass": [*ORIGIN, *ORIGIN, *acceleration]})
+    def response(self, m: Mathematics, columns: Columns) -> Columns:
+        """Attitude under a load, its moment about the centre of mass, and the points as :meth:`points` has them."""
+        attitude = self.attitude(m, columns)["attitude"]
+        rotation, velocity, _ = _split_attitude(attitude)
+        moment = self._moment(m, columns, rotation, velocity, columns["load"])
+        return {"attitude": attitude, "moment": moment, **self.points(m, {**columns, "attitude": attitude})}
 
     def sweep(self, m: Mathematics, columns: Columns) -> Columns:
         """One sweep over the later nodes of a step: attitudes, moments, then momenta and angles."""

@@ -81,7 +81,7 @@ def _platform_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
         trace_function("platform_ends", {**states, **start}, platform.ends),
         trace_function("platform_rates", loaded, platform.rates),
         trace_function("platform_motion", loaded, platform.motion),
-        trace_derivative("platform_derivative", loaded, platform.motion, "load"),
+        trace_derivative("platform_derivative", loaded, platform.motion, ("load",)),
     )
 
 

@@ -134,14 +134,21 @@ def derivative_along(
     return casadi.vertsplit(casadi.densify(casadi.substitute(derivative, symbols, column(values))))
 
 
-def trace_derivative(name: str, inputs: Mapping[str, int], equations: Equations, varying: str) -> TracedFunction:
-    """Trace the directional derivative of ``equations`` along ``seed``, a change of the column ``varying``."""
+def trace_derivative(
+    name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]
+) -> TracedFunction:
+    """Trace the directional derivative of ``equations`` along changes of the columns ``varying``.
+
+    The changes are further inputs behind all others, each by the name of its column with ``_seed`` behind it.
+    """
+    seeds = {f"{each}_seed": inputs[each] for each in varying}
 
     def derivative(m: Mathematics, columns: Columns) -> Columns:
         outputs = equations(m, columns)
-        return {each: rates_along(values, columns[varying], columns["seed"]) for each, values in outputs.items()}
+        variables, changes = ([entry for each in names for entry in columns[each]] for names in (varying, seeds))
+        return {each: rates_along(values, variables, changes) for each, values in outputs.items()}
 
-    return trace_function(name, {**inputs, "seed": inputs[varying]}, derivative)
+    return trace_function(name, {**inputs, **seeds}, derivative)
 
 
 def trace_kinks(name: str, inputs: Mapping[str, int], equations: Equations, varying: Sequence[str]) -> TracedFunction:

@@ -17,7 +17,7 @@ DRIVE_CONSTANTS = len(law.DriveConstants._fields)
 
 
 def winch_functions() -> tuple[TracedFunction, ...]:
-    """``winch_drive``, ``winch_rates``, ``winch_margins``, and ``winch_derivative`` of outputs by the command.
+    """``winch_drive``, ``winch_rates``, ``winch_margins``, and ``winch_derivative`` of rates and margins.
 
     ``drive`` is what follows from the parameters: the constants of the law, the radians of the motor for each metre of
     rope, and the fastest rate in 1/s.
@@ -27,7 +27,7 @@ def winch_functions() -> tuple[TracedFunction, ...]:
         trace_function("winch_drive", {"parameters": PARAMETERS}, _drive),
         trace_function("winch_rates", known, _rates),
         trace_function("winch_margins", known, _margins),
-        trace_derivative("winch_derivative", known, _outputs, "command"),
+        trace_derivative("winch_derivative", known, _rates_and_margins, ("states", "command")),
     )
 
 
@@ -48,7 +48,5 @@ def _margins(m: Mathematics, columns: Columns) -> Columns:
     return {"margins": law.limit_margins(m, constants, law.DriveState(*columns["states"]), columns["command"][0])}
 
 
-def _outputs(m: Mathematics, columns: Columns) -> Columns:
-    """Outputs that depend on the command: acceleration of the rope, then the margins."""
-    acceleration, _ = _rates(m, columns)["rates"]
-    return {"outputs": [acceleration, *_margins(m, columns)["margins"]]}
+def _rates_and_margins(m: Mathematics, columns: Columns) -> Columns:
+    return {**_rates(m, columns), **_margins(m, columns)}

@@ -173,18 +173,27 @@ static int refresh(Slave *slave) {
   return 1;
 }
 
+/* The load cell follows the change of the tension in so far as it lags no more. */
+static void change_late(const Slave *slave, double *change) {
+  double instant[INSTANT_SIZE], changes[1][2];
+  tension_instant(slave, change[TENSION], change[TENSION_RATE], instant);
+  if (!change_shown_late(slave, instant, slave->start[TENSION_DELAY], changes)) return;
+  change[TENSION] = changes[0][0];
+  change[TENSION_RATE] = changes[0][1];
+}
+
 static int differentiate(const Slave *slave, const double *seed, double *change) {
   const double *real = slave->state.real;
   double motion[MOTION_SIZE];
   if (!extrapolated_motion(real + POSITION, &slave->state.elapsed, motion)) return 0;
   if (!cable_derivative(motion, real + FIRST_STATE, parameters_of(slave), slave->start, seed + POSITION,
-                        change + FIRST_OUTPUT, change + FIRST_RATE))
+                        seed + FIRST_STATE, change + FIRST_OUTPUT, change + FIRST_RATE, change + VARIABLE_COUNT))
     return 0;
   if (middle_is_now(slave)) {
     memcpy(change + MIDDLE_FORCE, change + FIRST_OUTPUT, 3 * sizeof(double));
     memcpy(change + MIDDLE_FORCE + 3, change + FIRST_RATE, 3 * sizeof(double));
   }
-  if (slave->start[TENSION_DELAY] > 0.0 && slave->delay_line.count) change[TENSION] = change[TENSION_RATE] = 0.0;
+  change_late(slave, change);
   return 1;
 }
 

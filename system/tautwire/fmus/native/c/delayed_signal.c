@@ -38,3 +38,20 @@ static int shown_late(Slave *slave, const double *instant, double lag, double (*
   line->count -= (size_t)is_open;
   return 1;
 }
+
+/* Change of what `shown_late` shows along a change of the signal now, which it shows between the last instant and now
+   alone; 0 where the signal is shown at once. */
+static int change_shown_late(const Slave *slave, const double *instant, double lag, double (*changes)[2]) {
+  const State *state = &slave->state;
+  double held[INSTANT_SIZE] = {0.0}, segment[SEGMENT_SIZE];
+  int is_open = slave->is_model_exchange && is_behind_last_instant(state, instant);
+  DelayLine line = {1, 1, NULL};
+  if (!(lag > 0.0) || !(is_open || slave->delay_line.count)) return 0;
+  memset(changes, 0, SIGNAL_AXES * sizeof *changes);
+  if (!is_open) return 1;
+  held[0] = state->last_instant[0];
+  segment_between(held, instant, segment);
+  line.segments = segment;
+  delayed_values(&line, lag, changes);
+  return 1;
+}

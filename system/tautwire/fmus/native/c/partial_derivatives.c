@@ -1,10 +1,24 @@
-/* Partial derivatives of outputs with respect to inputs at the present instant, with the states held. */
+/* Partial derivatives of outputs with respect to inputs at the present instant, with the states held; in model exchange
+   also of the states' rates and with respect to states. */
 
-static int refuse_derivative(const Slave *slave, unsigned int reference, const char *wanted) {
+static int is_state(unsigned int reference) { return reference >= FIRST_STATE && reference < FIRST_STATE + STATE_COUNT; }
+
+static int has_derivative(const Slave *slave, unsigned int reference) {
+  if (reference < VARIABLE_COUNT) return is_output[reference];
+  return slave->is_model_exchange && reference < VARIABLE_COUNT + STATE_COUNT;
+}
+
+static int may_change(const Slave *slave, unsigned int reference) {
+  return reference < INPUT_COUNT || (slave->is_model_exchange && is_state(reference));
+}
+
+static int refuse_derivative(const Slave *slave, unsigned int reference, const char *wanted, const char *in_exchange) {
+  static const char *const given[] = {"outputs with respect to inputs",
+                                      "outputs and rates of states with respect to inputs and states"};
   char message[300];
   if (reference >= REFERENCE_COUNT) return are_known(slave, &reference, 1), STATUS_ERROR;
-  snprintf(message, sizeof message, "%s is no %s: derivatives are those of outputs with respect to inputs",
-           variable_names[reference], wanted);
+  snprintf(message, sizeof message, "%s is no %s%s: derivatives are those of %s", variable_names[reference], wanted,
+           slave->is_model_exchange ? in_exchange : "", given[slave->is_model_exchange]);
   log_message(slave, STATUS_ERROR, message);
   return STATUS_ERROR;
 }
@@ -17,18 +31,18 @@ static int check_derivative(const Slave *slave, const unsigned int *unknowns, si
     return STATUS_ERROR;
   }
   for (k = 0; k < unknown_count; k++)
-    if (unknowns[k] >= VARIABLE_COUNT || !is_output[unknowns[k]]) return refuse_derivative(slave, unknowns[k], "output");
+    if (!has_derivative(slave, unknowns[k])) return refuse_derivative(slave, unknowns[k], "output", " and no rate of a state");
   for (k = 0; k < known_count; k++)
-    if (knowns[k] >= INPUT_COUNT) return refuse_derivative(slave, knowns[k], "input");
+    if (!may_change(slave, knowns[k])) return refuse_derivative(slave, knowns[k], "input", " and no state");
   return STATUS_OK;
 }
 
-/* How all variables change along a change of the inputs; NaN where the law has no value or no derivative. */
+/* How all variables change along a change of inputs and states; NaN where the law has no value or no derivative. */
 static int change_along(const Slave *slave, const double *seed, double *change) {
   int k;
-  memset(change, 0, VARIABLE_COUNT * sizeof(double));
+  memset(change, 0, CHANGE_SIZE * sizeof(double));
   if (slave->parameters_valid && differentiate(slave, seed, change)) return STATUS_OK;
-  for (k = 0; k < VARIABLE_COUNT; k++) change[k] = NAN;
+  for (k = 0; k < CHANGE_SIZE; k++) change[k] = NAN;
   log_with_inputs(slave, STATUS_WARNING, "no derivatives: the law has none");
   return STATUS_WARNING;
 }
@@ -37,12 +51,12 @@ static int change_along(const Slave *slave, const double *seed, double *change) 
 static int get_directional_derivative(const Slave *slave, const unsigned int *unknowns, size_t unknown_count,
                                       const unsigned int *knowns, size_t known_count, const double *seed,
                                       double *sensitivity) {
-  double inputs[INPUT_COUNT] = {0.0}, change[VARIABLE_COUNT];
+  double along[VARIABLE_COUNT] = {0.0}, change[CHANGE_SIZE];
   size_t k;
   int status = check_derivative(slave, unknowns, unknown_count, knowns, known_count);
   if (status != STATUS_OK) return status;
-  for (k = 0; k < known_count; k++) inputs[knowns[k]] += seed[k];
-  status = change_along(slave, inputs, change);
+  for (k = 0; k < known_count; k++) along[knowns[k]] += seed[k];
+  status = change_along(slave, along, change);
   for (k = 0; k < unknown_count; k++) sensitivity[k] = change[unknowns[k]];
   return status;
 }
@@ -51,14 +65,14 @@ static int get_directional_derivative(const Slave *slave, const unsigned int *un
 static int get_adjoint_derivative(const Slave *slave, const unsigned int *unknowns, size_t unknown_count,
                                   const unsigned int *knowns, size_t known_count, const double *seed,
                                   double *sensitivity) {
-  double inputs[INPUT_COUNT] = {0.0}, change[VARIABLE_COUNT];
+  double along[VARIABLE_COUNT] = {0.0}, change[CHANGE_SIZE];
   size_t k, j;
   int status = check_derivative(slave, unknowns, unknown_count, knowns, known_count);
   for (k = 0; k < known_count && status != STATUS_ERROR; k++) {
-    inputs[knowns[k]] = 1.0;
+    along[knowns[k]] = 1.0;
     /* Where the law has no value all is NaN, which is told once. */
-    if (status == STATUS_OK) status = change_along(slave, inputs, change);
-    inputs[knowns[k]] = sensitivity[k] = 0.0;
+    if (status == STATUS_OK) status = change_along(slave, along, change);
+    along[knowns[k]] = sensitivity[k] = 0.0;
     for (j = 0; j < unknown_count; j++) sensitivity[k] += seed[j] * change[unknowns[j]];
   }
   return status;

@@ -177,20 +177,51 @@ static int refresh(Slave *slave) {
   return 1;
 }
 
-/* An action is a load, then the acceleration of the mass, in which the motion of all points is linear. */
-static int differentiate(const Slave *slave, const double *seed, double *change) {
-  const double *real = slave->state.real;
-  double load[LOAD_SIZE], action[LOAD_SIZE + 3] = {0.0}, action_seed[LOAD_SIZE + 3], quaternion[4];
-  load_of(slave, real, load);
-  extrapolate_load(load, slave->state.elapsed, action);
-  load_of(slave, seed, action_seed);
-  if (!differentiate_acceleration(slave, real + MASS_STATE, seed, action_seed + LOAD_SIZE)) return 0;
+/* Change of the normalised quaternion; in co-simulation that of the state is held. */
+static void change_quaternion(const Slave *slave, const double *seed, double *change) {
+  const double *quaternion = slave->state.real + FIRST_STATE;
+  double squared = 0.0, along = 0.0;
+  int k;
+  for (k = 0; k < 4; k++) squared += quaternion[k] * quaternion[k];
+  for (k = 0; k < 4; k++) along += quaternion[k] * seed[FIRST_STATE + k];
+  for (k = 0; k < 4; k++) change[k] = (seed[FIRST_STATE + k] - quaternion[k] * along / squared) / sqrt(squared);
+}
+
+/* Attitude, and the changes of attitude, motion of the mass and moment about it. */
+typedef struct {
+  double attitude[ATTITUDE_SIZE], attitude_change[ATTITUDE_SIZE], mass_change[9], moment_change[3];
+} Response;
+
+/* The change of the points beside; these are linear in the motion of the mass, whose acceleration does not count. */
+static int respond(const Slave *slave, const double *seed, Response *response, double *points) {
+  const double *real = slave->state.real, *values = parameters_of(slave), *momentum = real + MOMENTUM_STATE;
+  double load[LOAD_SIZE], load_seed[LOAD_SIZE], mass[9] = {0.0}, quaternion[4], quaternion_seed[4];
+  double *mass_change = response->mass_change;
+  if (!present_attitude(slave, load, response->attitude)) return 0;
+  load_of(slave, seed, load_seed);
+  memcpy(mass, real + MASS_STATE, MASS_SIZE * sizeof(double));
+  memcpy(mass_change, seed + MASS_STATE, MASS_SIZE * sizeof(double));
+  if (!differentiate_acceleration(slave, mass, seed, mass_change, mass_change + 6)) return 0;
   present_quaternion(slave, quaternion);
-  if (!body_derivative(quaternion, real + MOMENTUM_STATE, action, parameters_of(slave), slave->start,
-                       action_seed, change + FIRST_OUTPUT))
-    return 0;
+  change_quaternion(slave, seed, quaternion_seed);
+  return body_derivative(quaternion, momentum, load, mass, values, slave->start, quaternion_seed, seed + MOMENTUM_STATE,
+                         load_seed, mass_change, response->attitude_change, response->moment_change, points);
+}
+
+static int differentiate(const Slave *slave, const double *seed, double *change) {
+  double *rates = change + VARIABLE_COUNT, of_turning[4];
+  Response response;
+  int k;
+  if (!respond(slave, seed, &response, change + FIRST_OUTPUT)) return 0;
+  memcpy(change + FIRST_STATE, seed + FIRST_STATE, STATE_COUNT * sizeof(double));
+  change_measured_position(slave, change + FIRST_OUTPUT, change);
   if (middle_is_now(slave))
     memcpy(change + MIDDLE_OUTPUT, change + FIRST_ATTACHMENT_OUTPUT, POINT_SIZE * CABLE_COUNT * sizeof(double));
+  if (!quaternion_rate(seed + FIRST_STATE, response.attitude, rates)) return 0;
+  if (!quaternion_rate(slave->state.real + FIRST_STATE, response.attitude_change, of_turning)) return 0;
+  for (k = 0; k < 4; k++) rates[k] += of_turning[k];
+  memcpy(rates + 4, response.mass_change + 3, MASS_SIZE * sizeof(double));
+  memcpy(rates + 10, response.moment_change, sizeof response.moment_change);
   return 1;
 }
 

@@ -19,11 +19,11 @@ static int change_cables(const Slave *slave, const Changes *along, double (*outp
 /* How speed and acceleration of a rope change; a winch's acceleration follows its command at once. */
 static int change_speed(const Slave *slave, int cable, const double *command, const double *seed, double *change) {
 #if HAS_WINCHES
-  double outputs[4];
+  double rates[2], margins[3], held[2] = {0.0, 0.0};
   const double *state = slave->state.real + FIRST_STATE + winch_states[cable];
-  if (!winch_derivative(state, command, slave->start + winch_place(cable), seed, outputs)) return 0;
+  if (!winch_derivative(state, command, slave->start + winch_place(cable), held, seed, rates, margins)) return 0;
   change[0] = 0.0;
-  change[1] = outputs[0];
+  change[1] = rates[0];
 #else
   (void)slave, (void)cable, (void)command;
   memcpy(change, seed, 2 * sizeof(double));

@@ -34,8 +34,12 @@ typedef struct {
 
 enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR };
 
+/* A change of variables has a number for each; where it is a result, rates of the states are behind them. */
+#define CHANGE_SIZE (VARIABLE_COUNT + STATE_COUNT)
+
 /* Each component has these; they return 0 where its law has no value. The last one adds to `change`, which begins with
-   zeros, how the outputs change along a change `seed` of the inputs, with the states held. */
+   zeros, how outputs and rates of the states change along a change `seed` of inputs and states. Components without
+   model exchange need neither states nor rates there. */
 static int derive_start(Slave *slave, double *start_states);
 static int advance(Slave *slave, double step, int at_end);
 static int refresh(Slave *slave);

@@ -127,8 +127,14 @@ static int refresh(Slave *slave) {
 
 static int differentiate(const Slave *slave, const double *seed, double *change) {
   const double *real = slave->state.real;
-  double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1];
-  return winch_derivative(real + FIRST_STATE, &command, slave->start, seed + COMMAND, change + FIRST_OUTPUT + 1);
+  double command = real[COMMAND] + slave->state.elapsed * real[COMMAND + 1], *rates = change + VARIABLE_COUNT;
+  if (!winch_derivative(real + FIRST_STATE, &command, slave->start, seed + FIRST_STATE, seed + COMMAND, rates,
+                        change + FIRST_OUTPUT + 2))
+    return 0;
+  memcpy(change + FIRST_STATE, seed + FIRST_STATE, STATE_COUNT * sizeof(double));
+  change[FIRST_OUTPUT] = slave->start[MOTOR_SPEED_RATIO] * seed[FIRST_STATE];
+  change[FIRST_OUTPUT + 1] = rates[0];
+  return 1;
 }
 
 #ifdef MODEL_EXCHANGE
