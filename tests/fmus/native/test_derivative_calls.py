@@ -126,7 +126,9 @@ def test_by_fmi_3_they_are_the_same_and_the_adjoint_is_the_transpose(native_fmus
         assert np.allclose(adjoint, expected.T @ seed, rtol=1e-12, atol=1e-12 * np.max(np.abs(adjoint)))
 
 
-def test_by_fmi_3_other_unknowns_knowns_and_counts_are_refused(tmp_path: Path) -> None:
+def test_by_fmi_3_other_unknowns_knowns_and_counts_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     path = build_fmus(ROBOT, tmp_path, native=True, fmi=3).platform
     fmu, outputs, inputs = running(path, tmp_path / "platform")
     for call, count in ((fmu.getDirectionalDerivative, 1), (fmu.getAdjointDerivative, 1)):
@@ -139,6 +141,14 @@ def test_by_fmi_3_other_unknowns_knowns_and_counts_are_refused(tmp_path: Path) -
         ):
             with pytest.raises(FMICallException):
                 call(*arguments)
+    time = fmpy.read_model_description(str(path)).modelVariables[-1].valueReference
+    for unknowns, knowns, message in (
+        ([time], inputs[:1], "time is no output"),
+        (outputs[:1], [time], "time is no input"),
+    ):
+        with pytest.raises(FMICallException):
+            fmu.getDirectionalDerivative(unknowns, knowns, [1.0])
+        assert message in capsys.readouterr().out
     fmu.freeInstance()
 
 

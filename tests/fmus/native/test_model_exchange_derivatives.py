@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,6 +15,7 @@ from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.schema import Formula
 from tests.support.effect_cases import CASES, UNLISTED_CASES, Case
 from tests.support.effects import with_effects
 from tests.support.fmus import in_hand
@@ -269,6 +271,40 @@ def test_others_are_refused(
             with pytest.raises(FMICallException):
                 getattr(model.fmu, f"get{call}Derivative")(*arguments)
             assert message in capsys.readouterr().out
+
+
+def test_by_fmi_3_there_are_those_with_respect_to_the_time(tmp_path: Path) -> None:
+    robot = replace(example("three"), formulas=(Formula("force_x", "300*time*sin(2*time)"),))
+    time, step = 0.7, 1e-2
+    with in_model_exchange(build_fmus(robot, tmp_path, native=True, fmi=3).platform, 0.2) as model:
+        model.run()
+        states, unknowns = model.states(), unknowns_of(model)
+
+        def shown(at: float) -> Array:
+            model.go_to(at, states)
+            return np.array(model.get(*unknowns))
+
+        steps = step * np.arange(1, 5)
+        expected = WEIGHTS @ np.array([shown(time + each) - shown(time - each) for each in steps]) / step
+        model.go_to(time, states)
+        known, references = model.references["time"], [model.references[name] for name in unknowns]
+        direction = np.array(model.fmu.getDirectionalDerivative(references, [known], [2.0]))
+        (adjoint,) = model.fmu.getAdjointDerivative(references, [known], [1.0] * len(references), 1)
+        with pytest.raises(FMICallException):
+            model.fmu.getDirectionalDerivative([known], [known], [1.0])
+    assert direction == pytest.approx(2.0 * expected, rel=EXACT, abs=1e-12) and np.any(expected)
+    assert adjoint == pytest.approx(np.sum(expected), rel=EXACT)
+
+
+def test_what_a_lagging_sensor_shows_has_none_with_respect_to_the_time(fmus_of: Callable[..., RobotFmus]) -> None:
+    with in_model_exchange(fmus_of("delayed", 3).cables[0]) as model:
+        model.run()
+        shake(model, 0.01)
+        unknowns = unknowns_of(model)
+        references = [model.references[name] for name in unknowns]
+        shown = model.fmu.getDirectionalDerivative(references, [model.references["time"]], [1.0])
+    unknown = {name for name, value in zip(unknowns, shown, strict=True) if np.isnan(value)}
+    assert unknown == {"tension", "tension_rate"}
 
 
 def test_in_co_simulation_there_are_none_of_rates_and_states(

@@ -174,10 +174,10 @@ static int refresh(Slave *slave) {
 }
 
 /* The load cell follows the change of the tension in so far as it lags no more. */
-static void change_late(const Slave *slave, double *change) {
+static void change_late(const Slave *slave, double time, double *change) {
   double instant[INSTANT_SIZE], changes[1][2];
   tension_instant(slave, change[TENSION], change[TENSION_RATE], instant);
-  if (!change_shown_late(slave, instant, slave->start[TENSION_DELAY], changes)) return;
+  if (!change_shown_late(slave, instant, time, slave->start[TENSION_DELAY], changes)) return;
   change[TENSION] = changes[0][0];
   change[TENSION_RATE] = changes[0][1];
 }
@@ -193,7 +193,7 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
     memcpy(change + MIDDLE_FORCE, change + FIRST_OUTPUT, 3 * sizeof(double));
     memcpy(change + MIDDLE_FORCE + 3, change + FIRST_RATE, 3 * sizeof(double));
   }
-  change_late(slave, change);
+  change_late(slave, seed[TIME_SEED], change);
   return 1;
 }
 

@@ -40,18 +40,18 @@ static int shown_late(Slave *slave, const double *instant, double lag, double (*
 }
 
 /* Change of what `shown_late` shows along a change of the signal now, which it shows between the last instant and now
-   alone; 0 where the signal is shown at once. */
-static int change_shown_late(const Slave *slave, const double *instant, double lag, double (*changes)[2]) {
+   alone; NaN along a change of the time; 0 where the signal is shown at once. */
+static int change_shown_late(const Slave *slave, const double *instant, double time, double lag, double (*changes)[2]) {
   const State *state = &slave->state;
   double held[INSTANT_SIZE] = {0.0}, segment[SEGMENT_SIZE];
-  int is_open = slave->is_model_exchange && is_behind_last_instant(state, instant);
+  int is_open = slave->is_model_exchange && is_behind_last_instant(state, instant), axis;
   DelayLine line = {1, 1, NULL};
   if (!(lag > 0.0) || !(is_open || slave->delay_line.count)) return 0;
   memset(changes, 0, SIGNAL_AXES * sizeof *changes);
-  if (!is_open) return 1;
   held[0] = state->last_instant[0];
   segment_between(held, instant, segment);
   line.segments = segment;
-  delayed_values(&line, lag, changes);
+  if (is_open) delayed_values(&line, lag, changes);
+  for (axis = 0; axis < SIGNAL_AXES && time != 0.0; axis++) changes[axis][0] = changes[axis][1] = NAN;
   return 1;
 }

@@ -2,8 +2,6 @@
 
 #include "fmi3Functions.h"
 
-#define TIME_REFERENCE REFERENCE_COUNT
-
 typedef struct {
   Slave slave;
   fmi3LogMessageCallback log;
@@ -43,6 +41,7 @@ static fmi3Instance new_instance(fmi3String token, const char *fault, fmi3Boolea
   instance->slave.log = log_to_importer;
   instance->slave.owner = instance;
   instance->slave.is_model_exchange = is_model_exchange;
+  instance->slave.has_time_variable = 1;
   if (fault || !token || strcmp(token, model_guid)) {
     refuse(instance, fault ? fault : "the token is not that of this FMU");
     free(instance);

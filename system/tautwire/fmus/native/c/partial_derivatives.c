@@ -1,7 +1,11 @@
 /* Partial derivatives of outputs with respect to inputs at the present instant, with the states held; in model exchange
-   also of the states' rates and with respect to states. */
+   also of the states' rates and with respect to states and the time. */
 
 static int is_state(unsigned int reference) { return reference >= FIRST_STATE && reference < FIRST_STATE + STATE_COUNT; }
+
+static int is_time(const Slave *slave, unsigned int reference) {
+  return slave->has_time_variable && reference == TIME_REFERENCE;
+}
 
 static int has_derivative(const Slave *slave, unsigned int reference) {
   if (reference < VARIABLE_COUNT) return is_output[reference];
@@ -9,15 +13,17 @@ static int has_derivative(const Slave *slave, unsigned int reference) {
 }
 
 static int may_change(const Slave *slave, unsigned int reference) {
-  return reference < INPUT_COUNT || (slave->is_model_exchange && is_state(reference));
+  return reference < INPUT_COUNT || (slave->is_model_exchange && (is_state(reference) || is_time(slave, reference)));
 }
 
 static int refuse_derivative(const Slave *slave, unsigned int reference, const char *wanted, const char *in_exchange) {
   static const char *const given[] = {"outputs with respect to inputs",
                                       "outputs and rates of states with respect to inputs and states"};
   char message[300];
-  if (reference >= REFERENCE_COUNT) return are_known(slave, &reference, 1), STATUS_ERROR;
-  snprintf(message, sizeof message, "%s is no %s%s: derivatives are those of %s", variable_names[reference], wanted,
+  const char *name = is_time(slave, reference) ? "time" : NULL;
+  if (!name && reference >= REFERENCE_COUNT) return are_known(slave, &reference, 1), STATUS_ERROR;
+  if (!name) name = variable_names[reference];
+  snprintf(message, sizeof message, "%s is no %s%s: derivatives are those of %s", name, wanted,
            slave->is_model_exchange ? in_exchange : "", given[slave->is_model_exchange]);
   log_message(slave, STATUS_ERROR, message);
   return STATUS_ERROR;
@@ -37,7 +43,7 @@ static int check_derivative(const Slave *slave, const unsigned int *unknowns, si
   return STATUS_OK;
 }
 
-/* How all variables change along a change of inputs and states; NaN where the law has no value or no derivative. */
+/* How all variables change along a change of inputs, states and the time; NaN where the law has no value or no derivative. */
 static int change_along(const Slave *slave, const double *seed, double *change) {
   int k;
   memset(change, 0, CHANGE_SIZE * sizeof(double));
@@ -47,15 +53,17 @@ static int change_along(const Slave *slave, const double *seed, double *change) 
   return STATUS_WARNING;
 }
 
+static size_t seed_place(unsigned int known) { return known == TIME_REFERENCE ? TIME_SEED : known; }
+
 /* Product of the Jacobian and a seed, one number for each known. */
 static int get_directional_derivative(const Slave *slave, const unsigned int *unknowns, size_t unknown_count,
                                       const unsigned int *knowns, size_t known_count, const double *seed,
                                       double *sensitivity) {
-  double along[VARIABLE_COUNT] = {0.0}, change[CHANGE_SIZE];
+  double along[SEED_SIZE] = {0.0}, change[CHANGE_SIZE];
   size_t k;
   int status = check_derivative(slave, unknowns, unknown_count, knowns, known_count);
   if (status != STATUS_OK) return status;
-  for (k = 0; k < known_count; k++) along[knowns[k]] += seed[k];
+  for (k = 0; k < known_count; k++) along[seed_place(knowns[k])] += seed[k];
   status = change_along(slave, along, change);
   for (k = 0; k < unknown_count; k++) sensitivity[k] = change[unknowns[k]];
   return status;
@@ -65,14 +73,14 @@ static int get_directional_derivative(const Slave *slave, const unsigned int *un
 static int get_adjoint_derivative(const Slave *slave, const unsigned int *unknowns, size_t unknown_count,
                                   const unsigned int *knowns, size_t known_count, const double *seed,
                                   double *sensitivity) {
-  double along[VARIABLE_COUNT] = {0.0}, change[CHANGE_SIZE];
+  double along[SEED_SIZE] = {0.0}, change[CHANGE_SIZE];
   size_t k, j;
   int status = check_derivative(slave, unknowns, unknown_count, knowns, known_count);
   for (k = 0; k < known_count && status != STATUS_ERROR; k++) {
-    along[knowns[k]] = 1.0;
+    along[seed_place(knowns[k])] = 1.0;
     /* Where the law has no value all is NaN, which is told once. */
     if (status == STATUS_OK) status = change_along(slave, along, change);
-    along[knowns[k]] = sensitivity[k] = 0.0;
+    along[seed_place(knowns[k])] = sensitivity[k] = 0.0;
     for (j = 0; j < unknown_count; j++) sensitivity[k] += seed[j] * change[unknowns[j]];
   }
   return status;

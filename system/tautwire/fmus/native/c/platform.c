@@ -138,13 +138,13 @@ static int present_kinks(const Slave *slave, const double *mass, double *indicat
 }
 #endif
 
-/* Change of that acceleration along a change of the inputs and of the motion of the mass. */
+/* Change of that acceleration along a change of the inputs, the time and the motion of the mass. */
 static int differentiate_acceleration(const Slave *slave, const double *mass, const double *seed,
                                       const double *mass_seed, double *change) {
-  double now[6], force_seed[6], time = platform_time(slave), time_seed = 0.0;
+  double now[6], force_seed[6], time = platform_time(slave);
   present_force(slave, now);
   sum_forces(seed, FIRST_FORCE, FORCE_COUNT, force_seed);
-  return platform_derivative(mass, now, &time, parameters_of(slave), mass_seed, force_seed, &time_seed, change);
+  return platform_derivative(mass, now, &time, parameters_of(slave), mass_seed, force_seed, seed + TIME_SEED, change);
 }
 
 /* Appends the path of this step to the delay line of the position sensor; each end has nine numbers. */
@@ -193,16 +193,16 @@ static void refresh_measured_position(Slave *slave, const double *motion) {
 #endif
 }
 
-/* Change of the measured position along a change of the motion of now. */
-static void change_measured_position(const Slave *slave, const double *motion, double *change) {
+/* Change of the measured position along a change of the motion of now and of the time. */
+static void change_measured_position(const Slave *slave, const double *motion, double time, double *change) {
 #ifdef MEASURED_POSITION
   double changes[3][2], instant[INSTANT_SIZE];
   int is_late, axis;
   motion_instant(slave, motion, instant);
-  is_late = change_shown_late(slave, instant, slave->start[POSITION_DELAY], changes);
+  is_late = change_shown_late(slave, instant, time, slave->start[POSITION_DELAY], changes);
   for (axis = 0; axis < 3; axis++)
     change[MEASURED_POSITION + axis] = slave->start[POSITION_GAIN] * (is_late ? changes[axis][0] : motion[axis]);
 #else
-  (void)slave, (void)motion, (void)change;
+  (void)slave, (void)motion, (void)time, (void)change;
 #endif
 }

@@ -36,7 +36,7 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
   if (!differentiate_acceleration(slave, mass, seed, mass_seed, change + ACCELERATION)) return 0;
   memcpy(change + FIRST_STATE, mass_seed, MASS_SIZE * sizeof(double));
   if (middle_is_now(slave)) memcpy(change + MIDDLE_MOTION, change + FIRST_STATE, 9 * sizeof(double));
-  change_measured_position(slave, change + FIRST_STATE, change);
+  change_measured_position(slave, change + FIRST_STATE, seed[TIME_SEED], change);
   memcpy(rates, mass_seed + 3, 3 * sizeof(double));
   memcpy(rates + 3, change + ACCELERATION, 3 * sizeof(double));
   return 1;

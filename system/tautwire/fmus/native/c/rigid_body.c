@@ -214,7 +214,7 @@ static int differentiate(const Slave *slave, const double *seed, double *change)
   int k;
   if (!respond(slave, seed, &response, change + FIRST_OUTPUT)) return 0;
   memcpy(change + FIRST_STATE, seed + FIRST_STATE, STATE_COUNT * sizeof(double));
-  change_measured_position(slave, change + FIRST_OUTPUT, change);
+  change_measured_position(slave, change + FIRST_OUTPUT, seed[TIME_SEED], change);
   if (middle_is_now(slave))
     memcpy(change + MIDDLE_OUTPUT, change + FIRST_ATTACHMENT_OUTPUT, POINT_SIZE * CABLE_COUNT * sizeof(double));
   if (!quaternion_rate(seed + FIRST_STATE, response.attitude, rates)) return 0;

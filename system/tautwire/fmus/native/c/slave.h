@@ -28,6 +28,7 @@ typedef struct {
   int outputs_stale;
   int has_middle_inputs;
   int is_model_exchange;
+  int has_time_variable;
   Log log;
   void *owner;
 } Slave;
@@ -36,10 +37,12 @@ enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR };
 
 /* A change of variables has a number for each; where it is a result, rates of the states are behind them. */
 #define CHANGE_SIZE (VARIABLE_COUNT + STATE_COUNT)
+#define TIME_SEED VARIABLE_COUNT
+#define SEED_SIZE (VARIABLE_COUNT + 1)
 
 /* Each component has these; they return 0 where its law has no value. The last one adds to `change`, which begins with
-   zeros, how outputs and rates of the states change along a change `seed` of inputs and states. Components without
-   model exchange need neither states nor rates there. */
+   zeros, how outputs and rates of the states change along a change `seed` of inputs, states and, behind all
+   variables, the time. Components without model exchange need inputs and outputs alone. */
 static int derive_start(Slave *slave, double *start_states);
 static int advance(Slave *slave, double step, int at_end);
 static int refresh(Slave *slave);
@@ -57,6 +60,8 @@ static void further_values(const Slave *slave, double *values);
 #define FURTHER_COUNT 0
 #endif
 #define REFERENCE_COUNT (VARIABLE_COUNT + FURTHER_COUNT)
+/* By FMI 3.0 the time is a variable too. */
+#define TIME_REFERENCE REFERENCE_COUNT
 
 /* Whether outputs of the middle of a step are those of now. By the model structure they depend on inputs in this mode
    alone, and importers compress Jacobians by it. */
