@@ -12,6 +12,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from fmpy.model_description import ModelDescription
 
+from tautwire.fmus.native.c_toolchain import PLATFORMS
 from tautwire.fmus.packaging import RobotFmus
 from tests.support.folders import SUPPORT
 
@@ -37,13 +38,14 @@ class Plan:
     held: list[tuple[int, str, float]] = field(default_factory=list)
     shown: list[tuple[int, str]] = field(default_factory=list)
 
-    def text(self) -> str:
-        """As ``host.c`` reads it."""
+    def text(self, platform: str = "linux64", by_model_exchange: bool = False, root: str = "") -> str:
+        """As ``host.c`` reads it, with the libraries of a platform; ``root`` is in front of their paths."""
         descriptions = [_description(folder) for folder in self.folders]
         references = [{v.name: v.valueReference for v in d.modelVariables} for d in descriptions]
-        lines = []
+        lines = ["exchange yes"] if by_model_exchange else []
         for folder, description in zip(self.folders, descriptions, strict=True):
-            lines.append(f"fmu {_library(folder, description)}")
+            lines.append(f"fmu {root}{_library(folder, description, platform)}")
+            lines.append(f"states {len(description.derivatives)}")
             lines.append(f"guid {description.guid}")
             lines.append(f"resources {(folder / 'resources').as_uri()}")
         for a, output, b, name in self.connections:
@@ -98,8 +100,9 @@ def _description(folder: Path) -> ModelDescription:
     return fmpy.read_model_description(str(folder))
 
 
-def _library(folder: Path, description: ModelDescription) -> Path:
-    return folder / "binaries" / "linux64" / f"{description.coSimulation.modelIdentifier}.so"
+def _library(folder: Path, description: ModelDescription, platform: str) -> Path:
+    name = description.coSimulation.modelIdentifier
+    return folder / "binaries" / platform / f"{name}{PLATFORMS[platform].suffix}"
 
 
 def robot_plan(folders: list[Path], steps: int = STEPS) -> Plan:
@@ -118,29 +121,53 @@ def robot_plan(folders: list[Path], steps: int = STEPS) -> Plan:
     return plan
 
 
+def whole_robot_plan(folder: Path, cables: Sequence[int], command: str = "winch_speed") -> Plan:
+    """The whole robot as one FMU, the commands of its winches ramping."""
+    rate = {"winch_speed": "winch_acceleration"}.get(command, f"{command}_rate")
+    plan = Plan([folder], shown=[(0, f"position.{axis}") for axis in AXES])
+    plan.ramps = [(0, f"{command}_{number}", value) for number, value in zip(cables, RAMPS, strict=True)]
+    plan.held = [(0, f"{rate}_{number}", value) for number, value in zip(cables, RAMPS, strict=True)]
+    return plan
+
+
 def extracted(fmus: RobotFmus, into: Path) -> list[Path]:
     """The folders of a robot's FMUs, the platform's last."""
+    return unpacked((*fmus.cables, fmus.platform), into)
+
+
+def unpacked(paths: Sequence[Path], into: Path) -> list[Path]:
+    """The folders of FMUs."""
     folders = []
-    for fmu in (*fmus.cables, fmus.platform):
+    for fmu in paths:
         folders.append(into / fmu.stem)
         with zipfile.ZipFile(fmu) as archive:
             archive.extractall(folders[-1])
     return folders
 
 
-def compile_host(compiler: Sequence[str], scratch: Path) -> Host:
-    """Runs a plan in the C host, in an environment that has only what is given."""
-    program = scratch / "host"
+def compile_host(
+    compiler: Sequence[str],
+    scratch: Path,
+    link_flags: Sequence[str] = ("-pthread", "-ldl"),
+    emulator: Sequence[str] = (),
+) -> Host:
+    """Runs a plan in the C host, behind an ``emulator`` if any, in an environment that has only what is given."""
+    program = scratch / "host.exe"
     headers = next(Path(fmpy.__file__).parent.rglob("fmi2Functions.h")).parent
     source = SUPPORT / "c_host" / "host.c"
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-pthread", f"-I{headers}"]
-    subprocess.run([*compiler, *flags, str(source), "-o", str(program), "-ldl"], check=True)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{headers}"]
+    subprocess.run([*compiler, *flags, str(source), "-o", str(program), *link_flags], check=True)
 
     def run(plan: str, **environment: str) -> subprocess.CompletedProcess[str]:
         order = scratch / "plan.txt"
         order.write_text(plan, encoding="utf-8")
         return subprocess.run(
-            [str(program), str(order)], env=environment, capture_output=True, text=True, timeout=60, check=False
+            [*emulator, str(program), str(order)],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
         )
 
     return run
