@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -87,11 +87,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Leave in ``make test`` the cases that a ``validate`` mark excepts, and begin with the slowest modules."""
     for item in items:
         mark = item.get_closest_marker("validate")
-        excepted = mark.kwargs.get("but", ()) if mark else ()
-        if isinstance(item, pytest.Function) and any(word in item.callspec.id for word in excepted):
+        if mark and mark.kwargs and isinstance(item, pytest.Function) and _is_excepted(item.callspec.id, mark.kwargs):
             item.own_markers = [each for each in item.own_markers if each is not mark]
     ranks = {f"test_{name}": rank for rank, name in enumerate(SLOWEST_FIRST)}
     items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
+
+
+def _is_excepted(case: str, words: Mapping[str, Sequence[str]]) -> bool:
+    """Whether a case holds a word of ``but``, or none of ``only``."""
+    if "only" in words:
+        return not any(word in case for word in words["only"])
+    return any(word in case for word in words["but"])
 
 
 @pytest.fixture(scope="session")

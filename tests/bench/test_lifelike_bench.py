@@ -104,6 +104,7 @@ def test_another_rig_makes_lifelike_recordings_anew(tmp_path: Path, monkeypatch:
     lifelike_module._rig_version.cache_clear()
 
 
+@pytest.mark.validate
 def test_a_case_is_made_once_and_gives_robot_recordings_and_truth(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -107,6 +107,7 @@ def test_visibility_is_that_of_the_dense_formula() -> None:
     assert result.nats(3.0 * free + 5.0) == pytest.approx(0.0, abs=1e-5)
 
 
+@pytest.mark.validate
 def test_drift_columns_are_what_longer_ropes_do() -> None:
     stage = Stage(Case("made", "empty", "three", ()))
     robot = replace(stage.robot, noise=replace(stage.robot.noise, winch_speed=1.0))

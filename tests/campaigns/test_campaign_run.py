@@ -60,6 +60,7 @@ def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None
     assert row["cable.modulus"] == VALUES[0] and row["index"] == 3 and "failure" not in row
 
 
+@pytest.mark.validate
 def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> None:
     plan = read(tmp_path, moving())
     shared = build_context(plan, {})
@@ -76,6 +77,7 @@ def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> 
     assert result.series["z"][-1] == motion.position[-1, 2]
 
 
+@pytest.mark.validate
 def test_controllers_are_designed_for_the_declared_robot_by_default(tmp_path: Path) -> None:
     plan = read(tmp_path, moving().replace("5.001", "5.02").replace("duration = 0.1", "duration = 0.8"))
     row = run_job(build_context(plan, {}), Job(1, 0, 1, VALUES), tmp_path / "kept").row
@@ -86,6 +88,7 @@ def test_controllers_are_designed_for_the_declared_robot_by_default(tmp_path: Pa
     assert knowing["path_error_largest"] < 0.1 * row["path_error_largest"]
 
 
+@pytest.mark.validate
 def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     text = moving().replace('"feedforward"', '"lqg"').replace("[compute]", "[compute]\nnoise = true")
     plan = read(tmp_path, text)
@@ -108,6 +111,7 @@ def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     assert one["end_z"] == motion.position[-1, 2]
 
 
+@pytest.mark.validate(but=["feedforward-1"])
 @pytest.mark.parametrize(("controller", "variant"), [("feedforward", 0), ("feedforward", 1), ("lqg", 1)])
 def test_outputs_are_true_whatever_sensors_show(controller: str, variant: int, tmp_path: Path) -> None:
     plan = plan_file(tmp_path, moving().replace('"feedforward"', f'"{controller}"'))
@@ -178,6 +182,7 @@ def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.validate
 def test_a_robot_of_another_structure_gets_fmus_of_its_own_once(tmp_path: Path) -> None:
     base = example("three")
     other = base.with_effect(EffectSetting("payload", {"mass": 3.0}))
@@ -200,6 +205,7 @@ def test_a_path_is_read_by_the_columns_of_the_robot_file(tmp_path: Path) -> None
     np.testing.assert_allclose(speeds, [[-0.001, -0.002, -0.003]] * 2)
 
 
+@pytest.mark.validate
 def test_a_recorded_path_starts_where_its_recording_starts(tmp_path: Path) -> None:
     header = "time,winch_speed_1,winch_speed_2,winch_speed_3,x,y,z"
     rows = [f"{0.01 * row},0,0,0,28.9,0.1,5.4" for row in range(6)]
@@ -261,6 +267,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_what_came_before(tmp_path
     assert all("\n" not in row["failure"] for row in (above, wrong))
 
 
+@pytest.mark.validate
 def test_a_machine_that_fails_is_no_row(tmp_path: Path) -> None:
     plan = read(tmp_path, moving())
     (tmp_path / "file").write_text("", encoding="utf-8")

@@ -143,6 +143,7 @@ def test_what_is_no_report_is_refused(document: dict[str, Any], said: str, tmp_p
     assert said in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.validate
 def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
     fitter, chosen, sample, fit = fitted(3)
     result = SelectionResult(tuple(chosen), (1.0, 1.0), fit, (), ())

@@ -77,6 +77,7 @@ def test_inertia_centre_of_mass_and_attachments_vary(tmp_path: Path) -> None:
     assert row["stiffness_least"] == pytest.approx(1.0 / np.linalg.eigvalsh(compliance)[-1], rel=1e-6)
 
 
+@pytest.mark.validate
 def test_a_run_along_a_turning_path_has_its_orientations(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, 'robot = "robot.toml"\ncontrollers = ["feedforward"]\n' + TURNING)
     context = build_context(plan, {})

@@ -42,6 +42,7 @@ def test_a_correct_recording_has_no_problem(
     assert len(turned) == 1 and "the run starts so too, at [" in turned[0]
 
 
+@pytest.mark.validate
 def test_quaternions_in_another_order_are_a_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording = noisy(wandering_recording(ROBOT))
     wrong = replace(recording, orientation=recording.orientation[:, [1, 2, 3, 0]])
@@ -86,6 +87,7 @@ def starting(time: np.ndarray) -> np.ndarray:
     return np.asarray(np.sin(0.5 * np.pi * np.clip(time / 0.5, 0.0, 1.0)) ** 2)
 
 
+@pytest.mark.validate
 def test_what_simulate_says_of_a_platform_on_four_cables_passes_the_check(tmp_path: Path) -> None:
     time = np.arange(81) / 32.0
     shape = 0.05 + 0.02 * np.array([1.0, 0.0, -1.0, 0.0])

@@ -81,6 +81,7 @@ def test_files_without_a_controller_are_refused(
     assert not out.exists()
 
 
+@pytest.mark.validate
 def test_a_function_that_raises_leaves_the_run_until_then(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     law, path, out = tmp_path / "law.py", tmp_path / "path.toml", tmp_path / "result.csv"
     law.write_text(FUNCTION.replace("    return", "    1 / (time < 0.045)\n    return"), encoding="utf-8")

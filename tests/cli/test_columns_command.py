@@ -271,6 +271,7 @@ def test_matrices_of_matlab_keep_their_standard_names(tmp_path: Path, capsys: py
     np.testing.assert_array_equal(read.frame()["y"], frame["y"])
 
 
+@pytest.mark.validate(but=["mat"])
 @pytest.mark.parametrize("kind", ["csv", "mat", "parquet"])
 def test_columns_without_names_are_proposed_by_their_values(
     kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -360,6 +361,7 @@ def test_a_trackers_file_has_a_table_of_its_own_beside_the_log(
     assert "tracker.csv: no problems found" in capsys.readouterr().out
 
 
+@pytest.mark.validate
 def test_counts_of_a_log_get_their_factor_by_the_trackers_file(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -474,6 +476,7 @@ def test_an_orientation_beside_a_point_mass_is_not_proposed(tmp_path: Path, caps
     ]
 
 
+@pytest.mark.validate
 def test_the_proposal_for_a_rigid_platform_is_read_by_the_check(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -24,7 +24,7 @@ def laboratory_file(folder: Path) -> str:
     return str(folder / "log.csv")
 
 
-@pytest.mark.validate(but=["True"])
+@pytest.mark.validate
 @pytest.mark.parametrize("is_own_file", [True, False])
 def test_check_and_simulate_read_columns(is_own_file: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, robot = laboratory_file(tmp_path), tmp_path / "robot.toml"
@@ -53,6 +53,7 @@ def test_check_tells_a_wrong_unit_with_its_line(tmp_path: Path, capsys: pytest.C
     assert f"{own}: line 2, recording.columns.time.unit: is 'mm', not a known unit of time" in capsys.readouterr().out
 
 
+@pytest.mark.validate
 def test_columns_of_a_robot_file_are_read_from_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, other = laboratory_file(tmp_path), tmp_path / "other.toml"
     other.write_text((THREE / "robot.toml").read_text(encoding="utf-8") + "\n" + TABLE, encoding="utf-8")

@@ -132,6 +132,7 @@ def test_any_robot_file_is_read_or_refused(
             refused(filled(ROBOT_COMMANDS[command], ROBOT=place, OUT=place.parent / "out"), place, capsys)
 
 
+@pytest.mark.validate
 @settings(HOSTILE, max_examples=20)
 @given(content=same_robots(ROBOT_TEXT))
 def test_the_same_robot_otherwise_written_is_the_same(
@@ -180,6 +181,7 @@ def test_the_same_recording_otherwise_written_is_the_same(tmp_path: Path, conten
         assert read_recording(place, 3).frame().equals(read_recording(FIT, 3).first(6).frame())
 
 
+@pytest.mark.validate
 @settings(HOSTILE, max_examples=EXAMPLES_OF_TABLES)
 @given(content=recorded(TABLE_TEXT))
 def test_any_table_of_a_dynamic_test_is_read_or_refused(

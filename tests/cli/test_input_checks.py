@@ -253,6 +253,7 @@ def test_a_recording_of_speeds_alone_is_fine_for_simulate(tmp_path: Path) -> Non
     assert checked.problems == () and "trace does not" in checked.notes[-1]
 
 
+@pytest.mark.validate
 def test_a_recording_in_other_units_is_refused_by_check_and_trace_in_the_same_words(tmp_path: Path) -> None:
     frame = pd.read_csv(THREE / "fit.csv")
     frame["time"] *= 1e3
@@ -275,6 +276,7 @@ def test_check_that_is_fit_is_refused() -> None:
     assert "a recording of another motion" in caught.value.hint
 
 
+@pytest.mark.validate
 def test_check_reads_the_second_recording_and_tells_a_copy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     second, fit = tmp_path / "second.csv", pd.read_csv(THREE / "fit.csv")
     fit[500:].assign(time=fit["time"][500:] - 5.0).round(5).to_csv(second, index=False)

@@ -101,7 +101,7 @@ CASES = {
 }
 
 
-@pytest.mark.validate(but=["build"])
+@pytest.mark.validate
 @linux
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_killed_run_leaves_is_cleared_by_the_next(
@@ -122,7 +122,7 @@ def test_what_a_killed_run_leaves_is_cleared_by_the_next(
     assert names(tmp_path) == ["scratch", "workspace.csv", "workspace.csv-metadata.json"]
 
 
-@pytest.mark.validate(but=["build"])
+@pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
 @pytest.mark.parametrize(("case", "number"), [("build", 1), ("build", 15), ("simulate", 15), ("trace", 15)])
 def test_a_request_to_end_is_like_ctrl_c(tmp_path: Path, case: str, number: int) -> None:
@@ -158,6 +158,7 @@ def test_a_second_run_to_the_same_target_is_refused(tmp_path: Path, capsys: pyte
     assert run([*QUICK, "--out", str(out), "--quiet"]) == 0
 
 
+@pytest.mark.validate
 def test_neither_are_two_runs_mixed_in_one_folder(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "out")
     (tmp_path / "out").mkdir()
@@ -169,6 +170,7 @@ def test_neither_are_two_runs_mixed_in_one_folder(tmp_path: Path) -> None:
     assert names(tmp_path / "out") == ["a"]
 
 
+@pytest.mark.validate
 def test_a_folder_that_is_there_keeps_its_other_files(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -202,7 +204,7 @@ WRITING = [
 ]
 
 
-@pytest.mark.validate(but=["False"])
+@pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
 @pytest.mark.parametrize("already", [False, True])
 def test_a_full_disk_is_reported_and_nothing_is_half_written(tmp_path: Path, already: bool) -> None:
@@ -296,7 +298,7 @@ SHELL = {
 }
 
 
-@pytest.mark.validate(but=["nobody"])
+@pytest.mark.validate
 @linux
 @pytest.mark.parametrize("case", SHELL)
 def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> None:

@@ -23,6 +23,7 @@ def robot_file(tmp_path: Path) -> Path:
     return tmp_path / "robot.toml"
 
 
+@pytest.mark.validate(but=["2"])
 @pytest.mark.parametrize(("fmi", "folder"), [(2, THIS_PLATFORM), (3, "")])
 def test_build_writes_libraries_and_source_without_python(
     robot_file: Path, fmi: int, folder: str, tmp_path: Path
@@ -37,6 +38,7 @@ def test_build_writes_libraries_and_source_without_python(
     assert [name for name in names if name.startswith(f"binaries/{folder}")]
 
 
+@pytest.mark.validate(but=["both"])
 @pytest.mark.parametrize("options", [[], ["--co-simulation-only"]], ids=["both", "alone"])
 def test_build_leaves_model_exchange_out_by_an_option(robot_file: Path, options: list[str], tmp_path: Path) -> None:
     assert run(["build", str(robot_file), "--out", str(tmp_path / "out"), "--native", *options]) == 0
@@ -44,6 +46,7 @@ def test_build_leaves_model_exchange_out_by_an_option(robot_file: Path, options:
     assert (interface is None) == bool(options)
 
 
+@pytest.mark.validate
 def test_build_writes_the_whole_robot_as_one_fmu(
     robot_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

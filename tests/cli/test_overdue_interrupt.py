@@ -41,6 +41,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.validate
 def test_an_interrupt_ends_a_trace_inside_a_compiled_call(tmp_path: Path) -> None:
     (tmp_path / "scratch").mkdir()
     (tmp_path / "endless.py").write_text(TRACE_WITH_AN_ENDLESS_CALL)

@@ -56,7 +56,7 @@ def test_every_command_is_watched_but_what_is_done_at_once() -> None:
     assert {command.__name__ for command in COMMANDS} == AT_WORK.keys() | LONG.keys() | AT_ONCE
 
 
-@pytest.mark.validate(but=["check", "build", "fmus", "simulate", "linearise", "workspace"])
+@pytest.mark.validate(but=["check", "linearise", "workspace"])
 @pytest.mark.parametrize("command", AT_WORK)
 def test_a_command_at_work_names_what_it_does(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, heard: StringIO, command: str

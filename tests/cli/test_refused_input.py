@@ -181,6 +181,7 @@ def test_a_wrong_fmu_is_one_line_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.validate
 def test_a_port_that_is_missing_is_named_before_anything_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -65,6 +65,7 @@ def test_pages_draw_each_cable_to_its_attachment(tmp_path: Path) -> None:
         assert len(scene["edges"]) >= 12
 
 
+@pytest.mark.validate
 def test_build_connects_each_cable_with_its_attachment(tmp_path: Path) -> None:
     assert run(["build", str(written_robot(tmp_path)), "--out", str(tmp_path / "out")]) == 0
     archive = zipfile.ZipFile(tmp_path / "out" / "suspended.ssp")

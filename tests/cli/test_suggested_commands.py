@@ -83,6 +83,7 @@ def test_one_winch_that_is_missing_is_named(tmp_path: Path, capsys: pytest.Captu
     assert "the column winch_speed_2 is missing" in problem and "propose" not in problem
 
 
+@pytest.mark.validate
 def test_paths_with_spaces_are_one_word_of_the_suggested_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -99,6 +100,7 @@ def test_paths_with_spaces_are_one_word_of_the_suggested_command(
         assert shlex.split(named) == expected
 
 
+@pytest.mark.validate(only=["build---quiet", "simulate"])
 @pytest.mark.parametrize("how", ["--json", "--quiet"])
 @pytest.mark.parametrize("case", ["new", "example", "check", "build", "fmus", "simulate"])
 def test_nothing_of_it_is_for_machines(
@@ -110,6 +112,7 @@ def test_nothing_of_it_is_for_machines(
     assert "next: " not in captured.out + captured.err
 
 
+@pytest.mark.validate
 def test_from_a_new_robot_on_each_line_leads_to_the_next(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -43,6 +43,7 @@ def test_the_mode_across_the_plane_is_that_of_a_pendulum(tmp_path: Path, capsys:
     assert "damping ratio 0.00000" in capsys.readouterr().out
 
 
+@pytest.mark.validate
 def test_simulation_and_check_of_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     robot, speeds, result = robot_file(tmp_path), tmp_path / "speeds.csv", tmp_path / "result.csv"
     time = np.arange(301) * 0.01
@@ -64,6 +65,7 @@ def test_simulation_and_check_of_its_result(tmp_path: Path, capsys: pytest.Captu
     assert "no problems found" in capsys.readouterr().out
 
 
+@pytest.mark.validate
 def test_a_new_robot_file_of_two_cables_runs_as_it_stands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

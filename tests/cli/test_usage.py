@@ -103,6 +103,7 @@ def test_a_damaged_installation_is_no_interrupt(monkeypatch: pytest.MonkeyPatch)
         run(["pose", ROBOT])
 
 
+@pytest.mark.validate
 def test_a_name_that_standard_output_cannot_encode_is_printed_escaped(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time,\u03bcwinch_speed_1,x\n0,1,2\n0.1,1,2\n0.2,1,2\n", encoding="utf-8")

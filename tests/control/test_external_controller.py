@@ -145,6 +145,7 @@ def lqg_fmu(folder: Path, extra: tuple[str, ...] = (), script: str = SLAVE) -> P
     return build_by_command(folder / "regulator.py", folder / "Regulator.fmu", matrices)
 
 
+@pytest.mark.validate
 def test_lqg_as_a_state_space_moves_as_it_does_natively(fmus: RobotFmus, native: CosimulationResult) -> None:
     by_name = lqg()
     by_order = control.ss(by_name.A, by_name.B, by_name.C, by_name.D, by_name.dt)
@@ -186,6 +187,7 @@ def test_state_space_travels_in_a_controller_fmu(fmus: RobotFmus, native: Cosimu
     assert np.max(np.abs(closed_loop(fmus, file).position - native.position)) < SAME
 
 
+@pytest.mark.validate
 def test_limits_of_the_winches_bound_a_function_as_they_bound_a_state_space(fmus: RobotFmus) -> None:
     aim = ControlAim(tare=False, speed_limit=0.2, acceleration_limit=0.3)
     by_matrices = closed_loop(fmus, lqg(), aim=aim)
@@ -238,6 +240,7 @@ def test_state_spaces_that_do_not_fit_are_refused(fmus: RobotFmus, system: Any, 
     assert all(word in str(caught.value) for word in words), caught.value
 
 
+@pytest.mark.validate(only=["60.0-<lambda>-words2"])
 @pytest.mark.parametrize(
     ("speeds", "words"),
     [

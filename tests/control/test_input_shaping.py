@@ -139,6 +139,7 @@ def swing(times: Array, away: Array, begin: float) -> float:
     return float(np.max(np.linalg.norm(left, axis=1)))
 
 
+@pytest.mark.validate
 def test_swing_after_the_ramp_is_cut_by_far_more_than_twenty(three_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = paper_robot()
     ramp: Trajectory = WinchRamp(robot, 10.0)

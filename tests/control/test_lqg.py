@@ -196,6 +196,7 @@ def test_controller_of_another_robot_is_refused(fmus: dict[str, RobotFmus]) -> N
         cosimulate_closed_loop(fmus["eight"], three, design_controller(three), PATHS["three"], 1.0)
 
 
+@pytest.mark.validate
 def test_payload_that_nobody_declared_is_found_at_the_start(tmp_path: Path) -> None:
     robot, path = robot_named("three"), PATHS["three"]
     built = build_fmus(off_nominal(robot, 1.0, 0.8), tmp_path, native=True)
@@ -207,6 +208,7 @@ def test_payload_that_nobody_declared_is_found_at_the_start(tmp_path: Path) -> N
     assert peaks[1] > 1e-2
 
 
+@pytest.mark.validate
 def test_start_into_an_acceleration_is_not_taken_for_a_payload(three_fmus: RobotFmus) -> None:
     robot = paper_robot()
     ramp: Trajectory = WinchRamp(robot, 8.0)
@@ -214,6 +216,7 @@ def test_start_into_an_acceleration_is_not_taken_for_a_payload(three_fmus: Robot
     assert errors(motion, ramp).max() < 1e-3
 
 
+@pytest.mark.validate
 def test_tension_stays_near_its_limits_where_the_path_asks_for_more(fmus: dict[str, RobotFmus]) -> None:
     robot = robot_named("three")
     quick = Line((28.86, 0.0, 5.0), (28.86, 0.0, 6.0), 1.2)
@@ -226,7 +229,7 @@ def test_tension_stays_near_its_limits_where_the_path_asks_for_more(fmus: dict[s
     assert errors(held, quick)[-1] < 1e-4
 
 
-@pytest.mark.validate(but=["1.0-1.2-caroca"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("modulus", "mass"), [(1.32, 1.0), (1.32, 0.8), (1.0, 1.2)])
 def test_design_holds_another_modulus_and_payload(name: str, modulus: float, mass: float, tmp_path: Path) -> None:

@@ -102,6 +102,7 @@ def test_gains_of_a_planar_robot_are_scheduled(tmp_path: Path) -> None:
     assert labels[0] == labels[1] == labels[2]
 
 
+@pytest.mark.validate(but=["horizontal"])
 @pytest.mark.parametrize("plane", (VERTICAL, HORIZONTAL), ids=("vertical", "horizontal"))
 def test_closed_loop_in_a_plane_corrects_a_lasting_load(plane: Plane, tmp_path: Path) -> None:
     robot = planar_robot(tmp_path, plane)
@@ -129,6 +130,7 @@ def test_mode_across_a_single_cable_is_refused_by_name() -> None:
         design_controller(hung_point((0.0, 0.0, 2.0)))
 
 
+@pytest.mark.validate(but=["6"])
 @pytest.mark.parametrize("count", (3, 4, 6, 8))
 def test_undamped_turn_in_a_ring_of_cables_is_refused_by_name(count: int) -> None:
     message = r"suspended: has a mode of 1\.1 Hz, rotation about z, at \[0, 0, 1\.5\] m: no winch reaches it"
@@ -154,6 +156,7 @@ def test_friction_between_strands_stiffens_the_plant_of_the_design() -> None:
     assert margins_of(linearise(robot), design.knots()[0]).min_disk > 0.3
 
 
+@pytest.mark.validate
 def test_a_loop_that_small_errors_unsettle_is_noted() -> None:
     assert design_controller(example("three")).notes == ()
     design = design_controller(rigid_robots.underactuated_robot())

@@ -88,7 +88,7 @@ def lqg() -> Controller:
     return design_controller(crane_robot())
 
 
-@pytest.mark.validate(but=["octahedral", "hall"])
+@pytest.mark.validate(but=["hall"])
 @pytest.mark.parametrize("robot", (crane_robot(), octahedral_robot(), hall_robot()), ids=lambda robot: robot.name)
 def test_the_loop_around_the_model_is_stable_with_margins(robot: Robot) -> None:
     design = design_controller(robot)
@@ -129,6 +129,7 @@ def _with_feedback(plant: control.StateSpace, regulator: control.StateSpace, cou
     return control.ss(A, B, C, 0.0, plant.dt)
 
 
+@pytest.mark.validate
 def test_the_closed_loop_follows_a_pose_path_under_noise(native_crane_fmus: RobotFmus, lqg: Controller) -> None:
     robot, path = crane_robot(), turning_path(crane_robot())
     quiet = cosimulate_closed_loop(native_crane_fmus, robot, lqg, path, 1.2)
@@ -152,6 +153,7 @@ def without_vector(fmus: RobotFmus, name: str, folder: Path) -> RobotFmus:
     return replace(fmus, platform=platform, user_start_values={"platform": {}})
 
 
+@pytest.mark.validate
 def test_what_the_controller_measures_does_not_depend_on_other_outputs(
     native_crane_fmus: RobotFmus, lqg: Controller, tmp_path: Path
 ) -> None:
@@ -175,6 +177,7 @@ def test_a_platform_that_does_not_show_its_orientation_is_refused(
         controller_wires(blind)
 
 
+@pytest.mark.validate
 def test_a_load_on_a_platform_without_an_input_for_it_is_refused(
     native_crane_fmus: RobotFmus, lqg: Controller, tmp_path: Path
 ) -> None:
@@ -215,6 +218,7 @@ def test_feedforward_alone_follows_on_stiff_ropes_to_what_ramps_of_speed_leave(t
     assert distances.max() < 2e-5 and angles.max() < 2e-5
 
 
+@pytest.mark.validate
 def test_the_controller_fmu_makes_the_same_run(native_crane_fmus: RobotFmus, lqg: Controller, tmp_path: Path) -> None:
     robot, path = crane_robot(), turning_path(crane_robot())
     reference = elastic_reference(robot, path, sample_times(0.01, 0.6))

@@ -120,6 +120,7 @@ def test_what_no_tensions_within_the_bounds_carry_is_refused() -> None:
         path_tensions(robot, path_of(robot), times, "last_norm")
 
 
+@pytest.mark.validate
 def test_fewer_than_six_cables_are_moved_through_equilibria() -> None:
     robot = suspended_robot(3)
     x, y, z = robot.platform.start

@@ -59,6 +59,7 @@ def errors(position: Array, time: Array) -> Array:
     return np.asarray(np.linalg.norm(position - PATH.position(time), axis=1))
 
 
+@pytest.mark.validate
 def test_margins_hold_on_a_finer_grid_than_that_of_the_design(three: Robot, design: RobustController) -> None:
     start = np.array([three.platform.start])
     margins = margins_over(three, design.knots(), start, Range(), points=4)
@@ -108,6 +109,7 @@ def test_path_is_held_at_the_corners_of_the_range(three: Robot, design: RobustCo
         assert np.sqrt(np.mean(away[-100:] ** 2)) < 1e-3
 
 
+@pytest.mark.validate
 def test_force_is_answered_without_a_lasting_error(
     three: Robot, design: RobustController, three_example_fmus: RobotFmus
 ) -> None:
@@ -121,6 +123,7 @@ def test_force_is_answered_without_a_lasting_error(
     assert away[-1] < 1e-4
 
 
+@pytest.mark.validate
 def test_nothing_winds_up_at_the_limit_of_speed(
     three: Robot, design: RobustController, three_example_fmus: RobotFmus
 ) -> None:

@@ -103,6 +103,7 @@ def test_range_is_that_of_the_papers_rope_or_as_wide_about_another_one(caroca: R
     assert soft.moduli == pytest.approx((60e9 * 102 / 118.5, 60e9 * 135 / 118.5))
 
 
+@pytest.mark.validate
 def test_each_sample_of_delay_costs_margin_until_the_loop_breaks(design: Controller) -> None:
     margins = [margins_of(design.linear, late(design.knots()[0], samples)) for samples in range(6)]
     for before, after in pairwise(margins[:3]):
@@ -133,6 +134,7 @@ def test_no_loop_has_no_margin_to_lose(design: Controller) -> None:
     assert Margins(0.5, 2.0, 1.0, 1.0, 1.0).disk_gain == np.inf
 
 
+@pytest.mark.validate
 def test_range_takes_the_worst_of_its_robots(caroca: Robot, design: Controller) -> None:
     uncertain, start = Range((102e9, 135e9), (0.8, 1.2)), np.array([caroca.platform.start])
     worst = margins_over(caroca, design.knots(), start, uncertain, 2)

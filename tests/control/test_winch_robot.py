@@ -77,6 +77,7 @@ def test_without_limits_as_well(tmp_path: Path) -> None:
     assert np.linalg.norm(motion.position[-1] - end_of(robot, FREE)) < 1e-7
 
 
+@pytest.mark.validate
 def test_a_result_tells_what_the_winches_did(native_winch_fmus: RobotFmus) -> None:
     motion = cosimulate(native_winch_fmus, CORNERS[:2], SPEEDS[:2])
     assert list(motion.winch_speed) == [1, 2, 3]

@@ -43,6 +43,7 @@ def test_without_rollback_each_step_is_one_sweep(three_fmus: RobotFmus) -> None:
         assert coupling.statistics.sweeps == coupling.statistics.steps
 
 
+@pytest.mark.validate
 def test_the_statistics_show_the_energy_of_a_coupling_without_iteration(three_fmus: RobotFmus) -> None:
     residual_shares = []
     for supports_rollback in (True, False):
@@ -78,6 +79,7 @@ def test_a_tolerance_that_no_step_meets_is_an_error(three_fmus: RobotFmus) -> No
         simulate(coupling, experiment, recorded_ports(3), MemoryRecorder(4, 18))
 
 
+@pytest.mark.validate
 def test_midpoint_values_give_order_six(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.1, 0.05):
@@ -88,6 +90,7 @@ def test_midpoint_values_give_order_six(three_fmus: RobotFmus) -> None:
     assert 25.0 < errors[0] / errors[1] < 100.0
 
 
+@pytest.mark.validate
 def test_without_midpoint_values_the_order_is_four(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.05, 0.025):

@@ -42,7 +42,7 @@ def test_the_test_fmu_is_valid(winch: Path) -> None:
     assert validate_fmu(str(winch)) == []
 
 
-@pytest.mark.validate(but=["chosen1"])
+@pytest.mark.validate
 @needs_compiler
 @pytest.mark.parametrize("chosen", [{"step": 0.01}, {"tolerance": 1e-5}])
 def test_the_same_winch_by_either_version_gives_the_same_figures(
@@ -59,6 +59,7 @@ def test_the_same_winch_by_either_version_gives_the_same_figures(
     assert runs[0].statistics == runs[1].statistics
 
 
+@pytest.mark.validate
 @needs_compiler
 def test_both_versions_run_side_by_side_and_isolated(winch: Path, tmp_path: Path) -> None:
     winches = {1: winch, 2: lag_winch(tmp_path)}

@@ -96,6 +96,7 @@ def test_a_run_without_faults_is_whole_and_leaves_nothing(faulty: Path, numbers:
     assert nothing_is_left(numbers)
 
 
+@pytest.mark.validate(only=["did not return for 1 s"])
 @pytest.mark.parametrize(
     ("how", "fate"), [("hang", HUNG), ("spin", HUNG), ("crash", SEGV), ("abort", ABORT), ("leave", LEFT)]
 )
@@ -117,7 +118,7 @@ def test_an_fmu_lost_in_a_step_is_named_and_what_came_before_is_kept(
     assert nothing_is_left(numbers)
 
 
-@pytest.mark.validate(but=["crash", "setup"])
+@pytest.mark.validate(but=["crash"])
 @pytest.mark.parametrize(
     ("where", "call"),
     [
@@ -139,6 +140,7 @@ def test_an_fmu_lost_before_the_first_step_is_named(
     assert nothing_is_left(numbers)
 
 
+@pytest.mark.validate
 def test_what_a_hanging_fmu_has_started_ends_with_it(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -166,6 +168,7 @@ class Failing:
         return np.array([2.0, 0.0]), np.array([2.0, 0.0])
 
 
+@pytest.mark.validate
 def test_a_source_that_hangs_is_not_taken_for_an_fmu(faulty: Path, numbers: Path) -> None:
     with pytest.raises(RunAbortedError, match=r"the run did not return for 1 s outside any FMU at 0\.1 s"):
         run(faulty, Failing(0.1, None), SHORT)
@@ -201,6 +204,7 @@ def same(motion: CosimulationResult, other: CosimulationResult) -> bool:
     )
 
 
+@pytest.mark.validate(but=["None"])
 @pytest.mark.parametrize("tolerance", [None, 1e-6])
 def test_an_isolated_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tolerance: float | None) -> None:
     times = np.linspace(0.0, 2.0, 41)
@@ -213,6 +217,7 @@ def test_an_isolated_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tole
     assert fractions == pytest.approx(np.arange(1, 41) / 40)
 
 
+@pytest.mark.validate
 def test_so_is_a_run_with_a_controller(damped_fmus: RobotFmus) -> None:
     robot = paper_robot(damping=2.08e9)
     controller = design_controller(robot)
@@ -240,6 +245,7 @@ def test_a_failing_robot_keeps_its_run(three_fmus: RobotFmus) -> None:
     assert same(here.result, apart.result)
 
 
+@pytest.mark.validate
 def test_a_fresh_process_does_as_well_as_a_fork(faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "start_method", lambda: "spawn")
     statistics, kept = run(faulty)
@@ -259,7 +265,7 @@ run(Path(sys.argv[1]), patience=600.0)
 """
 
 
-@pytest.mark.validate(but=["2"])
+@pytest.mark.validate
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
 def test_ending_the_parent_process_ends_the_isolated_run(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch, ending: signal.Signals

@@ -48,6 +48,7 @@ def arguments(robot: Path, out: Path, *more: str) -> list[str]:
     return ["simulate", *files, *more]
 
 
+@pytest.mark.validate(but=["crash"])
 @pytest.mark.parametrize(
     ("how", "fate"),
     [
@@ -82,6 +83,7 @@ def test_the_run_until_then_is_written(
     assert list(scratch.iterdir()) == []
 
 
+@pytest.mark.validate
 def test_the_run_of_a_controller_until_then_is_written(
     robot: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -98,6 +100,7 @@ def test_the_run_of_a_controller_until_then_is_written(
     assert pd.read_csv(out)["time"].to_numpy() == pytest.approx(np.arange(12) * 0.01)
 
 
+@pytest.mark.validate
 def test_nothing_is_written_where_nothing_was_computed(
     robot: Path, scratch: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,6 +28,7 @@ class Rows(list[tuple[float, np.ndarray]]):
         self.append((time, row.copy()))
 
 
+@pytest.mark.validate
 def test_the_recorder_gets_a_row_for_every_sample_until_the_end(tmp_path: Path) -> None:
     write_recording(tmp_path / "recording.parquet", 50)
     rows, robot = Rows(), example("three")

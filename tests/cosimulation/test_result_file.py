@@ -112,6 +112,7 @@ def test_without_rows_or_after_anything_else_nothing_is_left(
     assert (tmp_path / name).read_text() == "before"
 
 
+@pytest.mark.validate(but=["result.parquet"])
 @pytest.mark.parametrize("name", NAMES)
 def test_rows_go_to_disk_as_they_come(tmp_path: Path, name: str) -> None:
     with open_result_file(tmp_path / name, COLUMNS) as result:
@@ -127,6 +128,7 @@ def test_rows_go_to_disk_as_they_come(tmp_path: Path, name: str) -> None:
         assert pq.ParquetFile(tmp_path / name).num_row_groups == 4
 
 
+@pytest.mark.validate(but=["result.parquet"])
 @pytest.mark.parametrize("name", NAMES)
 def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     block_bytes = 2**17

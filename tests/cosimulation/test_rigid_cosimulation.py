@@ -91,6 +91,7 @@ def test_the_order_is_above_five(native_crane_fmus: RobotFmus) -> None:
     assert np.log2(coarse / fine) > 5.0
 
 
+@pytest.mark.validate
 def test_a_platform_on_four_cables_swings_as_its_equations_say(tmp_path: Path) -> None:
     robot = suspended_robot(4)
     time = np.array([0.0, 0.2, 0.4, 1.0])
@@ -102,6 +103,7 @@ def test_a_platform_on_four_cables_swings_as_its_equations_say(tmp_path: Path) -
     assert pose_error(found, exact) < 1e-7
 
 
+@pytest.mark.validate
 def test_attached_at_the_centre_of_mass_it_moves_as_a_point(three_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = paper_robot()
     inertia = ((30.0, 1.0, 2.0), (1.0, 20.0, 3.0), (2.0, 3.0, 25.0))
@@ -182,6 +184,7 @@ def test_a_payload_sits_at_the_centre_of_mass(tmp_path: Path) -> None:
     assert runs[1].orientation == pytest.approx(runs[0].orientation, abs=1e-12)
 
 
+@pytest.mark.validate
 def test_a_position_sensor_shows_the_origin_late_and_scaled(native_crane_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = crane_robot().with_effect(EffectSetting("sensor_gain", {"position_gain": 1.01}))
     robot = robot.with_effect(EffectSetting("sensor_delay", {"position_delay": 0.02}))

@@ -23,7 +23,6 @@ from tests.support.rigid_robots import crane_robot, suspended_robot
 
 ROBOTS = [crane_robot(), suspended_robot(4)]
 TIME = np.array([0.0, 0.2, 0.4, 0.8])
-QUICK = [case for case in RIGID_CASES if case.name == "rotational_drag"]
 
 
 def by_the_rig(robot: Robot, case: Case) -> Robot:
@@ -33,6 +32,7 @@ def by_the_rig(robot: Robot, case: Case) -> Robot:
     )
 
 
+@pytest.mark.validate(only=["suspended-centre_of_mass"])
 @pytest.mark.parametrize("case", RIGID_CASES, ids=str)
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_statics_are_those_of_the_rig(robot: Robot, case: Case) -> None:
@@ -40,6 +40,7 @@ def test_statics_are_those_of_the_rig(robot: Robot, case: Case) -> None:
     assert static_tensions(with_effects(robot, case)) == pytest.approx(rig.start_tension, rel=1e-6)
 
 
+@pytest.mark.validate(but=["payload"])
 @pytest.mark.parametrize("case", [RIGID_CASES[0], same("payload", mass=6.0, x=0.1, y=-0.05)], ids=str)
 def test_the_orientation_at_the_start_is_that_of_the_rig(case: Case) -> None:
     robot = suspended_robot(4)
@@ -52,12 +53,10 @@ def test_the_orientation_at_the_start_is_that_of_the_rig(case: Case) -> None:
 
 
 # Each effect on one of the robots, in turn.
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("robot", "case"),
-    [
-        pytest.param(robot, case, marks=() if case in QUICK else pytest.mark.validate)
-        for robot, case in zip(cycle(ROBOTS), RIGID_CASES, strict=False)
-    ],
+    list(zip(cycle(ROBOTS), RIGID_CASES, strict=False)),
     ids=lambda value: getattr(value, "name", str(value)),
 )
 def test_effects_in_the_fmus_are_those_of_the_rig(robot: Robot, case: Case, tmp_path: Path) -> None:

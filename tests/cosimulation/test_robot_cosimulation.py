@@ -26,6 +26,7 @@ def ramp_error(fmus: RobotFmus, robot: Robot, step: float) -> float:
     return float(np.linalg.norm(motion.position[-1] - exact.position[-1]))
 
 
+@pytest.mark.validate(but=["08"])
 @pytest.mark.parametrize(("step", "bound"), [(0.1, 5e-7), (0.05, 2e-8), (0.01, 1e-9)])
 def test_the_papers_ramp_ends_where_the_rig_ends(three_fmus: RobotFmus, step: float, bound: float) -> None:
     assert ramp_error(three_fmus, paper_robot(), step) < bound
@@ -47,12 +48,14 @@ def test_steps_of_a_millisecond_add_up_to_nothing(three_fmus: RobotFmus) -> None
     assert ramp_error(three_fmus, paper_robot(), 0.001) < 1e-9
 
 
+@pytest.mark.validate(but=["logarithmic"])
 @pytest.mark.parametrize("law", ["logarithmic", "linear"])
 def test_it_does_so_with_damping_and_either_law(tmp_path: Path, law: str) -> None:
     robot = paper_robot(damping=2.08e9, law=law)
     assert ramp_error(build_fmus(robot, tmp_path), robot, 0.01) < 1e-7
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_every_example_follows_the_rig(name: str, tmp_path: Path) -> None:
     robot = example(name)
@@ -118,6 +121,7 @@ def test_progress_ends_at_one(three_fmus: RobotFmus) -> None:
     assert fractions == pytest.approx(np.arange(1, 11) / 10)
 
 
+@pytest.mark.validate
 def test_a_cable_may_go_slack_and_tight_again(tmp_path: Path) -> None:
     robot = replace(paper_robot(damping=2e8), platform=Platform(300.0, (28.86, 0.0, 5.0)))
     time = np.array([0.0, 0.05, 0.5, 0.55, 1.5])
@@ -149,6 +153,7 @@ def test_steps_chosen_by_a_tolerance_keep_it(three_fmus: RobotFmus, tolerance: f
     assert motion.statistics.steps < 600
 
 
+@pytest.mark.validate(but=["none"])
 @pytest.mark.parametrize(
     "changes",
     [
@@ -182,6 +187,7 @@ def swing_energy(robot: Robot, motion: CosimulationResult) -> np.ndarray:
     return np.asarray(kinetic + weight + np.sum(elastic, axis=1))
 
 
+@pytest.mark.validate
 def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> None:
     time = np.concatenate([[0.0, 0.5, 1.0], np.arange(1.05, 26.0, 0.05)])
     speed = np.zeros((len(time), 3))
@@ -195,6 +201,7 @@ def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> No
     assert motion.statistics.warnings() == ()
 
 
+@pytest.mark.validate(but=["None"])
 @pytest.mark.parametrize("patience", [None, 60.0])
 def test_a_run_that_begins_later_is_initialised_then(
     three_fmus: RobotFmus, patience: float | None, monkeypatch: pytest.MonkeyPatch

@@ -26,7 +26,7 @@ def completed(shipment: Shipment) -> Robot:
     return robot
 
 
-@pytest.mark.validate(but=["fast"])
+@pytest.mark.validate
 @pytest.mark.parametrize("shipment", SHIPMENTS, ids=lambda shipment: shipment.name)
 def test_the_co_simulation_makes_the_same_motion(shipment: Shipment, tmp_path: Path) -> None:
     brief = replace(shipment, duration=40.0 / shipment.rate)

@@ -102,6 +102,7 @@ def test_fmus_are_packed_as_they_are(archive: Path, three_fmus: RobotFmus) -> No
             assert packed.read(f"resources/{path.name}") == path.read_bytes()
 
 
+@pytest.mark.validate
 def test_every_parameter_has_its_exact_value(tmp_path: Path) -> None:
     robot = paper_robot().with_effect(EffectSetting("modulus", {"modulus": 0.7e11}, (2,)))
     description = read_ssd(str(write_ssp(robot, build_fmus(robot, tmp_path), tmp_path / "robot.ssp")))

@@ -62,6 +62,7 @@ def test_cables_that_do_not_differ_share_a_value() -> None:
     assert with_values_of_cables(context, shared) == (context, shared)
 
 
+@pytest.mark.validate
 def test_differences_that_the_effects_form_may_leave_are_none_of_the_cables() -> None:
     context, shared = selected((0.95, 0.97, 0.96), evidence=1e7)
     assert with_values_of_cables(context, shared) == (context, shared)

@@ -108,6 +108,7 @@ def test_a_rival_that_was_led_astray_replaces_the_best_if_it_explains_more_at_it
     assert begun == ([starts[best][0], elsewhere] if is_astray else [])
 
 
+@pytest.mark.validate
 def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
     """A slow force as large as the load leaves nothing of it to the score test."""
     robot, recording = example("three"), recorded("three", 1, {"payload": {"mass": 3.0}}).first(400)
@@ -135,6 +136,7 @@ def test_a_long_delay_is_predicted_although_the_slope_asks_for_a_short_one() -> 
         assert predictions[late].values["tension_delay"] == pytest.approx(0.17, abs=0.011)
 
 
+@pytest.mark.validate
 def test_fits_beside_a_disturbance_begin_where_runs_of_the_model_explain_most(monkeypatch: pytest.MonkeyPatch) -> None:
     """Slopes ask for a delay of a few milliseconds where it is longer than half a period of a mode."""
     robot, recording = example("three"), recorded("three", 1, {"sensor_delay": {"seconds": 0.17}}).first(600)

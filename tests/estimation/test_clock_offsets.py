@@ -37,7 +37,7 @@ def milliseconds(note: str) -> float:
     return float(note.split(" are ")[1].split(" ms")[0])
 
 
-@pytest.mark.validate(but=["tensions-three"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", ["three", "caroca"])
 @pytest.mark.parametrize("kind", LATE)
 def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str, kind: str) -> None:
@@ -48,6 +48,7 @@ def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str,
     assert milliseconds(notes[1]) < 0.1
 
 
+@pytest.mark.validate(but=["tensions"])
 @pytest.mark.parametrize("kind", LATE)
 def test_a_sensor_that_is_late_in_both_is_left_to_the_effect(kind: str) -> None:
     evidence, notes, _ = clocks_set("three", recorded("three", 1, LATE[kind]), recorded("three", 2, LATE[kind]))
@@ -88,6 +89,7 @@ def test_an_effect_is_no_clock(effects: dict[str, Any]) -> None:
         assert notes == ()
 
 
+@pytest.mark.validate
 def test_a_clock_is_seen_beside_an_effect() -> None:
     effects = {"payload": {"mass": 1.5}}
     _, notes, _ = clocks_set(

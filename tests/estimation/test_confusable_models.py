@@ -76,7 +76,7 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     assert found.confusable == ()
 
 
-@pytest.mark.validate(but=["modulus"])
+@pytest.mark.validate
 @pytest.mark.parametrize(("hidden", "expected"), [(SOFT_FRAME, "frame"), (ALL_SOFTER, "modulus")])
 def test_beside_a_disturbance_a_frame_takes_the_place_of_softer_ropes_only_where_it_is_one(
     hidden: dict[str, Any], expected: str

@@ -49,6 +49,7 @@ def test_machine_code_moves_as_python_does(by_python: CosimulationResult, monkey
     assert np.max(np.abs(by_machine_code.tension - by_python.tension)) < 1e-5
 
 
+@pytest.mark.validate
 def test_a_compiler_that_fails_leaves_python(by_python: CosimulationResult, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuses(command: Sequence[str], *_: Any, **__: Any) -> Any:
         return subprocess.CompletedProcess(command, 1, b"", b"error: no such header")

@@ -29,6 +29,7 @@ def with_noise(recording: Recording, alike: float, deviation: float, seed: int) 
     return replace(recording, position=recording.position + coloured)
 
 
+@pytest.mark.validate(but=["empty"])
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("effects", [{}, {"friction": {"coefficient": 0.05}}], ids=["empty", "friction"])
 def test_noise_that_is_declared_right_is_kept(name: str, effects: dict[str, dict[str, float]]) -> None:

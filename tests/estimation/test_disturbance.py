@@ -141,6 +141,7 @@ def test_open_loop_errors_of_lengths_count_from_the_first_recorded_one() -> None
     assert np.sum(np.mean(squares, axis=0)) == pytest.approx(np.sum(expected), rel=0.2)
 
 
+@pytest.mark.validate
 def test_an_undeclared_weight_is_followed_as_a_force_downwards() -> None:
     recording = recorded("three", 1, {"payload": {"mass": 30.0 / 9.81}})
     slow = Disturbance(OrnsteinUhlenbeck(30.0, 1e-3), *[OrnsteinUhlenbeck(0.0, 1.0)] * 2, NOISE.position, NOISE.tension)
@@ -271,6 +272,7 @@ def test_parameters_and_disturbance_that_make_up_for_each_other_are_fitted_toget
     assert again.values == pytest.approx(joint.values, abs=joint.standard_deviations[0])
 
 
+@pytest.mark.validate
 def test_a_fit_may_begin_where_the_model_is_far_off() -> None:
     """The tracker errs by 3 m, thousands of times its noise, as where a model misses decimetres."""
     recording = PAIR[0].first(400)
@@ -310,6 +312,7 @@ def test_a_fit_begins_at_a_start_that_is_a_little_less_probable_as_well(monkeypa
     assert begun == pytest.approx([1.0, 1.1, 1.0])
 
 
+@pytest.mark.validate
 def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> None:
     check = replace(PAIR[1], tension=PAIR[1].tension + process(8.0, 2.0, PAIR[1], 5)).first(400)
     fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
@@ -320,6 +323,7 @@ def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> No
     assert maximised_validation_likelihood(context, ROBOT, (), -np.inf) > of_fit + 100.0
 
 
+@pytest.mark.validate
 def test_a_hypothesis_may_have_another_disturbance_on_unseen_data_at_the_price_of_its_numbers() -> None:
     check = replace(PAIR[1], tension=PAIR[1].tension + process(8.0, 2.0, PAIR[1], 5)).first(400)
     fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
@@ -331,6 +335,7 @@ def test_a_hypothesis_may_have_another_disturbance_on_unseen_data_at_the_price_o
     assert best - 4.0 * np.log(400 * 6) - 30.0 < marginal < best - 4.0 * np.log(400 * 6) + 1.0
 
 
+@pytest.mark.validate
 def test_a_candidate_is_fitted_better_beside_a_disturbance_of_its_own() -> None:
     """Under the large one that a model without it needed, nearly anything fits."""
     data, validation = (data_of(recorded("three", seed, {"damping": {"damping": 9e8}}).first(400)) for seed in (3, 53))

@@ -76,6 +76,7 @@ def test_errors_of_recorded_lengths_are_no_number_of_the_disturbance() -> None:
     require_derivatives(robot, recording, noise, 1e-4)
 
 
+@pytest.mark.validate
 def test_a_platform_that_turns_has_moments_and_a_third_kind_of_sensor() -> None:
     """Its rotations are less linear: what the numbers change in the states changes the linearisation a little."""
     robot = with_noise(octahedral_robot())

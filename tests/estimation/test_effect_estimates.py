@@ -87,6 +87,7 @@ def test_correlations_are_those_of_each_two_parameters_beside_what_else_was_fitt
     assert found[0].value == pytest.approx(-1e7 / (2e8 * 0.1))
 
 
+@pytest.mark.validate
 def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
     fitter, chosen, sample, fit = fitted(3)
 

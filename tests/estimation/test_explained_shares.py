@@ -41,7 +41,7 @@ FITTER = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).media
 LOADED = ROBOT.with_effect(EffectSetting("payload", {"mass": 12.0}))
 
 
-@pytest.mark.validate(but=["friction", "sensor_delay"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("effect", "values", "max_position_error"),
     [
@@ -173,6 +173,7 @@ def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_mis
     assert left < 0.02 * missed
 
 
+@pytest.mark.validate
 def test_effects_that_cancel_change_less_together_than_each_alone() -> None:
     loaded = [Hypothesis(BY_NAME["payload"], ())]
     assert sizes_of(LOADED, loaded)[0] == pytest.approx(sizes_of(LOADED, loaded)[1])

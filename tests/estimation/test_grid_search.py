@@ -34,6 +34,7 @@ def looked(effects: dict[str, dict[str, float]]) -> tuple[IdentificationContext,
     return context, context.fitter, context.split.estimation
 
 
+@pytest.mark.validate
 def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     context, fitter, sample = looked({"slack": {"softness": 400.0}})
     slopes = score_test(context.robot, (), [SOFT, VISCOUS], fitter, sample)
@@ -66,6 +67,7 @@ def test_no_gain_is_predicted_where_nothing_is_hidden() -> None:
     assert found[SOFT].gain < 4.0
 
 
+@pytest.mark.validate
 def test_a_predicted_gain_is_replaced_only_by_a_larger_one() -> None:
     context, _, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     true = PredictedGain(1.0, {"force": 30.0, "yield_strain": 1e-4})

@@ -56,6 +56,7 @@ def test_an_effect_of_that_size_gains_what_the_threshold_asks_for() -> None:
     assert np.mean(np.sqrt(2.0 * np.array(gains))) == pytest.approx(expected, abs=1.3)
 
 
+@pytest.mark.validate
 def test_sizes_are_given_for_every_effect_and_never_beyond_its_bounds() -> None:
     found, _, _ = shown_by(THREE, {}, 11)
     assert {d.name for d in found.detectable} == {h.effect.name for h in hypotheses(THREE)}
@@ -73,6 +74,7 @@ def separation_beside(hypothesis: Hypothesis, value: float) -> Identifiability:
     return analyse_identifiability(context, robot, [hypothesis])
 
 
+@pytest.mark.validate
 def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
     found = separation_beside(Hypothesis(DAMPING, ALL), 9e8)
     alike = {(each.other, each.other_cables): each for each in found.confusable}

@@ -66,6 +66,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
     return found
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_recording_that_starts_at_rest_does_not_start_in_motion(name: str) -> None:
     robot = example(name)

@@ -73,6 +73,7 @@ def test_relaxed_ropes_have_relaxed_under_the_pretension_that_they_have() -> Non
     assert np.abs(relaxing_rates).max() < 1e-3 * lengths.min() / 0.4
 
 
+@pytest.mark.validate
 def test_pretension_is_uncertain_where_no_tension_is_measured_or_the_file_says_so() -> None:
     assert self_stress_deviation(EIGHT, (recorded("eight", 1),)) == (0.0, ())
     unseen, notes = self_stress_deviation(EIGHT, (blind("eight"),))

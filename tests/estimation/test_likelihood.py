@@ -194,6 +194,7 @@ def test_a_run_can_be_ended_at_each_of_its_segments() -> None:
         next(segments)
 
 
+@pytest.mark.validate(only=["half rate-position"])
 @pytest.mark.parametrize(("outputs", "quantity"), [("position", "position"), ("all", "tension")])
 @pytest.mark.parametrize("is_kept", [lambda rows: rows % 2 == 0, lambda rows: rows % 7 != 3], ids=["half rate", "gaps"])
 def test_a_late_sensor_that_misses_samples_is_most_probable_at_its_delay(

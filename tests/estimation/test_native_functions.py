@@ -84,6 +84,7 @@ def test_results_are_stacked_by_sample() -> None:
     assert by_sample(np.zeros((0, 6)), 3).shape == (3, 0, 2)
 
 
+@pytest.mark.validate
 @pytest.mark.skipif(not TOLD, reason="only Linux tells the memory of a process")
 def test_functions_that_are_kept_take_little_memory() -> None:
     a = SX.sym("a", 16, 16)

@@ -15,6 +15,7 @@ from tests.support.recordings import recorded
 from tests.support.robots import example
 
 
+@pytest.mark.validate(only=["1.0"])
 @pytest.mark.parametrize("begin", [1.0, 0.0, -1e-15, 40.0])
 def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     robot = example("caroca").with_effect(EffectSetting("payload", {"mass": begin}))

@@ -38,6 +38,7 @@ def test_a_clock_that_explains_all_is_set_at_once() -> None:
     assert told(found)
 
 
+@pytest.mark.validate
 def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they_are() -> None:
     first, second = read({**PAYLOAD, **LATE}, PAYLOAD)
     assert not told(first) and told(second)
@@ -71,6 +72,7 @@ def mean_squares(found: PreparedData) -> list[float]:
     return [float(np.mean(each.values[each.observed] ** 2)) for each in found.innovations]
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("count", [1e-6, 1e-4])
 def test_smoothed_lengths_leave_noise(monkeypatch: pytest.MonkeyPatch, count: float) -> None:
     recordings = counted(1, count), counted(2, count)
@@ -98,6 +100,7 @@ def test_speeds_between_counts_are_used_where_no_lengths_were_recorded() -> None
     assert max(mean_squares(found)) < 1.05
 
 
+@pytest.mark.validate(but=["lengths1"])
 @pytest.mark.parametrize("lengths", [None, np.array([np.nan, 1.0, np.nan])])
 def test_lengths_that_only_one_recording_has_are_not_smoothed(lengths: np.ndarray | None) -> None:
     fit, check = counted(1, 1e-4), counted(2, 1e-4)
@@ -109,12 +112,14 @@ def test_lengths_that_only_one_recording_has_are_not_smoothed(lengths: np.ndarra
     assert max(mean_squares(found)) < 1.05
 
 
+@pytest.mark.validate
 def test_a_recording_that_also_validates_has_the_same_speeds_in_both() -> None:
     (found,) = prepare_data(THREE, counted(1, 1e-6), None, WorkerPool(1))
     assert found.split.estimation.recording is found.split.validation.recording
     assert any(note.startswith("three-1.csv: winch speeds are rates of rope lengths; ") for note in found.notes)
 
 
+@pytest.mark.validate
 def test_a_model_far_off_decides_on_no_speeds() -> None:
     recordings = counted(1, 1e-6, PAYLOAD), counted(2, 1e-6, PAYLOAD)
     as_recorded, corrected = prepare_data(THREE, *recordings, WorkerPool(1))

@@ -103,6 +103,7 @@ def test_intervals_hold_their_values_whatever_the_samples_tell(names: tuple[str,
         assert low < high
 
 
+@pytest.mark.validate
 def test_a_fit_that_is_not_the_best_gets_the_interval_about_the_best() -> None:
     fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
     ((low, high),) = profile_intervals(fitter, fit, chosen, sample, HERE)

@@ -48,6 +48,7 @@ def test_what_a_platform_that_turns_lacks_is_named_alone(
     assert result.normalised_innovation_variance == pytest.approx(np.ones(6 + truth.cable_count), abs=0.4)
 
 
+@pytest.mark.validate
 def test_a_disturbance_of_no_size_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(likelihood, "MAX_STATE_ANGLE_BESIDE_DISTURBANCE", likelihood.MAX_STATE_ANGLE)
     recording = rigid_recording(OCTAHEDRAL, 60)

@@ -37,6 +37,7 @@ SPLIT = split_data(ROBOT, NOISE, RECORDING, None)
 SAMPLE = SPLIT.estimation
 
 
+@pytest.mark.validate
 def test_what_is_there_has_the_largest_score_and_its_values() -> None:
     found = score_test(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
@@ -44,6 +45,7 @@ def test_what_is_there_has_the_largest_score_and_its_values() -> None:
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.validate(only=["true1"])
 @pytest.mark.parametrize(
     ("name", "declared", "true"),
     [

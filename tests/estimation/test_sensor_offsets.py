@@ -42,6 +42,7 @@ def traced(hidden: dict[str, Any], **uncertainties: float) -> Trace:
     return trace(robot, recorded("three", 3, hidden), recorded("three", 53, hidden), lambda what, done: None)
 
 
+@pytest.mark.validate
 def test_the_true_model_of_a_tracker_off_zero_leaves_noise_from_a_measured_start() -> None:
     context = context_of(TRACKER)
     assert context.split.estimation.start != ROBOT.platform.start
@@ -72,6 +73,7 @@ def test_a_pulley_keeps_its_name_where_a_run_starts_elsewhere() -> None:
     assert with_declared_start(moved, selection) == (moved, selection)
 
 
+@pytest.mark.validate
 def test_where_nothing_is_missing_a_start_elsewhere_is_one() -> None:
     context = context_of({})
     x, y, z = ROBOT.platform.start

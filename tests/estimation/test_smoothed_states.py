@@ -104,6 +104,7 @@ def test_the_number_that_moved_farthest_comes_first() -> None:
     assert len(sizes) > 2 and sizes == sorted(sizes, reverse=True)
 
 
+@pytest.mark.validate
 def test_a_planar_robot_starts_in_its_plane_beside_an_uncertain_pretension(tmp_path: Path) -> None:
     robot_file, fit, _ = planar_case(tmp_path, VERTICAL, {}, 1, duration=3.0)
     robot, recording = read_robot(robot_file), read_recording(fit, 4)
@@ -119,6 +120,7 @@ def test_a_planar_robot_starts_in_its_plane_beside_an_uncertain_pretension(tmp_p
     assert started.platform.start != robot.platform.start
 
 
+@pytest.mark.validate
 def test_pretension_is_estimated_beside_ropes_that_relax() -> None:
     """The rig's eight cables are 60 N tighter than the file says, and have long relaxed under it."""
     robot = example("eight")
@@ -139,6 +141,7 @@ def test_pretension_is_estimated_beside_ropes_that_relax() -> None:
     assert static_tensions(started) + started.initial_state.tensions == pytest.approx(tensions[0], abs=1.0)
 
 
+@pytest.mark.validate
 def test_an_initial_state_is_that_of_the_robot_whose_numbers_the_simulation_has(tmp_path: Path) -> None:
     """Positions alone, of a softer robot: a smoother would move its moduli along with the pretension."""
     robot_file, _, _ = planar_case(

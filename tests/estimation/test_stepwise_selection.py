@@ -117,6 +117,7 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     assert required["creep"] == (100.0 if has_disturbance else context.evidence_threshold())
 
 
+@pytest.mark.validate(only=["6.0-True"])
 @pytest.mark.parametrize(
     ("first", "evidence", "explained", "is_significant"),
     [

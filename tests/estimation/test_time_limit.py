@@ -85,6 +85,7 @@ def test_a_short_limit_allows_fewer_samples_down_to_a_least_number() -> None:
     assert counts == [6_000, 12_000, 100_000, 100_000]
 
 
+@pytest.mark.validate
 def test_calls_that_were_dropped_are_ended_and_awaited_ones_begin_anew() -> None:
     begin = time.monotonic()
     with WorkerPool(2) as workers:

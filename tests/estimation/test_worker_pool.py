@@ -76,6 +76,7 @@ def test_what_a_call_raises_is_raised_here(count: int) -> None:
             list(workers.map_unordered(fail, [(8,)]))
 
 
+@pytest.mark.validate
 def test_an_interrupt_ends_work_that_has_begun(tmp_path: Path) -> None:
     def stop_when_begun() -> None:
         if (tmp_path / "begun").exists():

@@ -83,7 +83,7 @@ def difference(
     return float(np.max(np.abs(own.position - other.position)))
 
 
-@pytest.mark.validate(but=["three"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", sorted(PATHS))
 def test_lqg_gives_the_same_numbers_as_fmu(name: str, tmp_path: Path) -> None:
     robot = example(name)
@@ -129,6 +129,7 @@ def test_winches_are_asked_for_the_same_speeds(three: Robot, tmp_path: Path) -> 
     assert difference(robot, build_fmus(robot, tmp_path, native=True), design_controller(robot), tmp_path) < 1e-9
 
 
+@pytest.mark.validate
 def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmus, controller: Path) -> None:
     times = sample_times(0.01, 1.5)
     whole = cosimulate_with_controller(three_example_fmus, controller, times)

@@ -72,7 +72,7 @@ WINCHES = {
 }
 
 
-@pytest.mark.validate(but=["both"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", WINCHES)
 def test_it_is_the_rigs_drive_whatever_the_steps(name: str, tmp_path: Path) -> None:
     winch = WINCHES[name]

@@ -66,6 +66,7 @@ def folders(fmus: RobotFmus, tmp_path_factory: pytest.TempPathFactory) -> list[P
     return extracted(fmus, tmp_path_factory.mktemp("extracted"))
 
 
+@pytest.mark.validate
 def test_the_robot_in_a_c_program_is_that_in_python_and_near_the_one_model(host: Host, folders: list[Path]) -> None:
     plan = robot_plan(folders)
     shown = numbers(host(plan.text()))
@@ -139,6 +140,7 @@ def test_a_missing_python_is_an_error_in_a_c_program_but_not_in_a_python_process
     assert cable_plan([folder]).in_python()[0] > 0.0
 
 
+@pytest.mark.validate
 def test_fmus_of_two_robots_in_one_c_process_run_their_own_physics(
     host: Host, folders: list[Path], tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ def test_the_page_states_robot_law_and_every_variable_with_its_unit_and_start_va
             assert variable.start is None or f'<td class="number">{variable.start}</td>' in text
 
 
+@pytest.mark.validate
 def test_the_page_explains_effects_and_formulas(tmp_path: Path) -> None:
     formulas = (Formula("tension", "10 * tanh(travel)", (1,)), Formula("tension", "2 * sin(time)", (1,)))
     robot = replace(paper_robot(), name="Q&A <7>", formulas=formulas)

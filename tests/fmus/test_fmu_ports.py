@@ -34,6 +34,7 @@ def test_vectors_stand_as_one(three_fmus: RobotFmus) -> None:
     assert sum(3 if name.endswith(".x .y .z") else 1 for name in rows) == len(ports)
 
 
+@pytest.mark.validate
 def test_the_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["fmus", ROBOT]) == 0
     stdout = capsys.readouterr().out

@@ -37,6 +37,7 @@ def test_there_is_one_more_a_winch_where_the_robot_has_them(winch_fmus: RobotFmu
     assert all(path.name == f"{name}.fmu" and path.is_file() for name, path in winch_fmus.by_component.items())
 
 
+@pytest.mark.validate
 def test_fmpy_finds_nothing_to_complain_about(
     three_fmus: RobotFmus, eight_fmus: RobotFmus, winch_fmus: RobotFmus
 ) -> None:
@@ -94,6 +95,7 @@ def test_the_same_robot_gives_the_same_guid(three_fmus: RobotFmus, tmp_path: Pat
     ]
 
 
+@pytest.mark.validate
 def test_building_leaves_nothing_behind(tmp_path: Path) -> None:
     before, modules = list(sys.path), set(sys.modules)
     build_fmus(paper_robot(damping=1e9), tmp_path)
@@ -117,12 +119,14 @@ def test_two_robots_run_their_own_physics_in_one_process(three_fmus: RobotFmus, 
     assert tensions[1] - tensions[0] == pytest.approx(2.08e9 * np.pi * 0.002**2 * 0.1 * 45.0 / 73.2**2, rel=1e-3)
 
 
+@pytest.mark.validate
 def test_an_fmu_can_be_instantiated_over_and_over(three_fmus: RobotFmus) -> None:
     for _ in range(30):
         with in_hand(three_fmus.platform) as platform:
             assert platform.get("position.z") == [5.0]
 
 
+@pytest.mark.validate
 def test_effects_are_parameters_of_the_fmu(tmp_path: Path) -> None:
     robot = paper_robot().with_effect(EffectSetting("damping", {"damping": 1e9}, (2,)))
     fmus = build_fmus(robot.with_effect(EffectSetting("payload", {"mass": 12.0})), tmp_path)

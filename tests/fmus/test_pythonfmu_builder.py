@@ -43,16 +43,19 @@ fmpy.simulate_fmu({str(three_fmus.platform)!r}, stop_time=0.01)
     run("-c", loaded + BUILD.format(folder=str(tmp_path)))
 
 
+@pytest.mark.validate
 def test_beside_an_fmu_whose_folder_is_first_on_the_path(unpacked: Path, tmp_path: Path) -> None:
     run("-c", f"import sys; sys.path.insert(0, {str(unpacked)!r})\n" + BUILD.format(folder=str(tmp_path)))
 
 
+@pytest.mark.validate
 def test_where_an_fmus_copy_of_the_builder_was_imported(unpacked: Path, tmp_path: Path) -> None:
     copy = f"import sys; sys.path.insert(0, {str(unpacked)!r})\nimport pythonfmu.builder\n"
     copy += "assert not pythonfmu.builder.FmuBuilder.has_binary()\n"
     run("-c", copy + BUILD.format(folder=str(tmp_path)))
 
 
+@pytest.mark.validate
 def test_a_process_spawned_beside_a_loaded_fmu_builds_too(unpacked: Path, tmp_path: Path) -> None:
     script = tmp_path / "spawns.py"
     script.write_text(
@@ -79,6 +82,7 @@ if __name__ == "__main__":
     run(str(script))
 
 
+@pytest.mark.validate
 def test_what_travels_inside_is_imported_once_for_all_fmus_and_leaves_no_trace(tmp_path: Path) -> None:
     code = f"""
 import sys

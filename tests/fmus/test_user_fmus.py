@@ -116,6 +116,7 @@ def test_a_minimal_cable_gets_the_start_position_and_its_missing_columns_are_omi
     assert np.isfinite(motion.frame().to_numpy()).all()
 
 
+@pytest.mark.validate
 @needs_compiler
 def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) -> None:
     fmus = build_fmus(replace(paper_robot(), fmus=all_winches(winch)), tmp_path)
@@ -129,6 +130,7 @@ def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) ->
     assert error < doubt < 1.0
 
 
+@pytest.mark.validate
 def test_the_command_line_says_it_with_the_error(
     platform: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -150,6 +152,7 @@ def test_the_command_line_says_it_with_the_error(
     assert error < estimated < 2.0 * error
 
 
+@pytest.mark.validate
 def test_a_platform_that_starts_elsewhere_is_refused(platform: Path, tmp_path: Path) -> None:
     robot = replace(paper_robot(), fmus=(UserFmu("platform", platform),))
     robot = replace(robot, platform=replace(robot.platform, start=(28.86, 0.0, 5.01)))
@@ -157,6 +160,7 @@ def test_a_platform_that_starts_elsewhere_is_refused(platform: Path, tmp_path: P
         cosimulate(build_fmus(robot, tmp_path), CORNERS[:2], SPEEDS[:2])
 
 
+@pytest.mark.validate
 def test_a_platform_with_a_parameter_for_it_is_started_where_the_run_starts(tmp_path: Path) -> None:
     ours = build_fmus(paper_robot(), tmp_path / "ours").platform
     robot = replace(paper_robot(), fmus=(UserFmu("platform", ours),))

@@ -49,6 +49,7 @@ def test_all_else_in_an_fmu_stays(three_fmus: RobotFmus, tmp_path: Path) -> None
         assert all(before.read(name) == after.read(name) for name in before.namelist())
 
 
+@pytest.mark.validate
 def test_a_process_with_instances_never_freed_ends_well(three_fmus: RobotFmus) -> None:
     done = subprocess.run([sys.executable, "-c", MANY, str(three_fmus.cables[0])], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr.decode()[-500:]

@@ -43,6 +43,7 @@ def test_an_importer_ends_where_the_robot_ends(
     assert error <= importer.bounds[step], f"{error:.3g} mm"
 
 
+@pytest.mark.validate(but=["python"])
 def test_the_driver_ends_with_its_process_as_our_fmus_do(folder: Path) -> None:
     with zipfile.ZipFile(folder / "driver.fmu") as packed:
         library = packed.read("binaries/linux64/Driver.so")

@@ -36,6 +36,7 @@ def test_frequencies_at_each_place_are_those_of_the_plant_there() -> None:
         assert ratios[order] == pytest.approx(modes.damping_ratios, rel=1e-9)
 
 
+@pytest.mark.validate
 def test_a_coarse_path_finds_the_same_modes_as_a_fine_one() -> None:
     # The helix turns twice: between coarse places modes cross, and shapes turn by more than half a right angle.
     fine, coarse = (modes_along(paper_robot(damping=4e8), PAPER_HELIX, points=points) for points in (81, 17))

@@ -69,7 +69,7 @@ def free_modes(numbers: range, effects: tuple[str, ...]) -> FreeModes:
         measured += [run["measured_damping_ratio"][index] for index in shown]
         cables += [run["cables"]] * len(shown)
         for effect in effects:
-            ratios = linearise(weakly_damped(robot, effect)).modes.damping_ratios / WEAK[effect]
+            ratios = linearise(weakly_damped(robot, effect), swing=0.0).modes.damping_ratios / WEAK[effect]
             per_unit[effect] += ratios[shown].tolist()
     return FreeModes(np.array(measured), {key: np.array(each) for key, each in per_unit.items()}, np.array(cables))
 

@@ -61,6 +61,7 @@ def chi_squared(storage: float, viscous: float) -> float:
     return total
 
 
+@pytest.mark.validate
 def test_the_papers_pair_is_refuted_by_the_papers_table(measured: MaterialVerdict) -> None:
     declared = measured.reference_model
     assert (declared.material.modulus, declared.material.damping) == (134.8e9, 2.08e9)
@@ -70,6 +71,7 @@ def test_the_papers_pair_is_refuted_by_the_papers_table(measured: MaterialVerdic
     assert not measured.adequate_before
 
 
+@pytest.mark.validate
 def test_every_constant_pair_is_refuted(measured: MaterialVerdict) -> None:
     best = measured.model("constant")
     modulus, viscous = best.material.modulus / 1e9, best.material.damping / 1e9
@@ -84,6 +86,7 @@ def test_every_constant_pair_is_refuted(measured: MaterialVerdict) -> None:
     assert all(reading.outcomes["constant"][2] < 1e-6 for reading in measured.error_assumptions)
 
 
+@pytest.mark.validate
 def test_relaxation_is_found_and_is_not_all(measured: MaterialVerdict) -> None:
     alone = measured.model("relaxation")
     assert alone.chi_squared == pytest.approx(32.66, abs=0.01)
@@ -98,6 +101,7 @@ def test_relaxation_is_found_and_is_not_all(measured: MaterialVerdict) -> None:
     assert ("hysteresis", "relaxation", "sensor_delay") in measured.confusable_effects
 
 
+@pytest.mark.validate
 def test_residuals_are_in_standard_deviations_of_the_table(measured: MaterialVerdict) -> None:
     declared = measured.reference_model
     frequency, size, size_sigma, phase, phase_sigma = ROWS[5]
@@ -111,6 +115,7 @@ def test_residuals_are_in_standard_deviations_of_the_table(measured: MaterialVer
     assert np.max(np.abs([measured.chosen_model.storage_residuals, measured.chosen_model.damping_residuals])) < 2.0
 
 
+@pytest.mark.validate
 def test_errors_shrink_from_before_to_after(measured: MaterialVerdict) -> None:
     for role in ("fit", "check"):
         before, after = measured.error_before[role], measured.error_after[role]
@@ -119,6 +124,7 @@ def test_errors_shrink_from_before_to_after(measured: MaterialVerdict) -> None:
     assert measured.error_after["fit"].damping_rms < 1.2 * measured.noise_floor.damping_rms
 
 
+@pytest.mark.validate
 def test_the_static_test_was_foreseen_by_relaxation(measured: MaterialVerdict) -> None:
     (check,) = [check for check in measured.static_checks if check.role == "relaxation"]
     assert check.predicted.low < check.measured < check.predicted.high
@@ -152,6 +158,7 @@ def test_uncertainties_of_two_deviations_are_twice_those_of_one(measured: Materi
     assert uncertainties[0] == pytest.approx(uncertainties[1])
 
 
+@pytest.mark.validate
 def test_the_document_reads_like_a_trace(measured: MaterialVerdict) -> None:
     document = json.loads(json.dumps(material_document(measured), allow_nan=False))
     needed = {"verdict", "effects", "also_possible", "formula", "error_before", "error_after", "noise_floor"}
@@ -166,6 +173,7 @@ def test_the_document_reads_like_a_trace(measured: MaterialVerdict) -> None:
     assert set(relaxation) == {"modulus", "time"}
 
 
+@pytest.mark.validate
 def test_the_words_hold_the_figures(measured: MaterialVerdict) -> None:
     said = verdict_sentence(measured)
     assert "rejected" in said
@@ -178,6 +186,7 @@ def test_the_words_hold_the_figures(measured: MaterialVerdict) -> None:
     assert "no passive linear solid" in text
 
 
+@pytest.mark.validate
 def test_the_figure_shows_every_row_and_both_models(measured: MaterialVerdict) -> None:
     figure = material_figure(measured)
     storage, viscous = figure.axes[0], figure.axes[1]
@@ -202,6 +211,7 @@ def test_the_pair_of_a_row_is_as_written_or_worked_out(tmp_path: Path) -> None:
         pair_of_row(read_material_table(PAPER_TABLE), 3.0)
 
 
+@pytest.mark.validate
 def test_a_constant_pair_that_is_right_is_left_alone(tmp_path: Path) -> None:
     table = read_material_table(written(tmp_path / "t.csv", observed(CONSTANT, FREQUENCY, 0.02, seed=1)))
     verdict = trace_material(table, CONSTANT)
@@ -222,6 +232,7 @@ def test_a_wrong_pair_is_distinguished_from_a_wrong_law(tmp_path: Path) -> None:
     assert verdict.adequate_after
 
 
+@pytest.mark.validate
 def test_rows_that_no_model_follows_are_unexplained(tmp_path: Path) -> None:
     seen = observed(CONSTANT, FREQUENCY, 0.01)
     zigzag = replace(seen, storage=seen.storage * (1.0 + 0.1 * (-1.0) ** np.arange(8)))
@@ -269,6 +280,7 @@ def test_what_acts_in_a_robots_ropes_is_declared() -> None:
         declared_material(alone, "robot.toml")
 
 
+@pytest.mark.validate
 def test_a_declared_relaxation_that_is_right_is_left_alone(tmp_path: Path) -> None:
     relaxing = replace(CONSTANT, branches=(MaxwellBranch(60e9, 0.15),))
     table = read_material_table(written(tmp_path / "t.csv", observed(relaxing, FREQUENCY, 0.02, seed=1)))
@@ -279,6 +291,7 @@ def test_a_declared_relaxation_that_is_right_is_left_alone(tmp_path: Path) -> No
     assert verdict.reference_model.label == "damping + relaxation"
 
 
+@pytest.mark.validate
 def test_a_robot_takes_the_uncertainties_of_its_new_rope(tmp_path: Path) -> None:
     error = 0.02
     table = read_material_table(written(tmp_path / "t.csv", observed(CONSTANT, FREQUENCY, error, seed=1)))

@@ -18,7 +18,7 @@ def test_constant_pairs_are_left_alone() -> None:
         assert select_model(observed(CONSTANT, FREQUENCY, 0.02, seed), 0.01).chosen == PAIR
 
 
-@pytest.mark.validate(but=["material0"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     ("material", "effects"),
     [
@@ -32,6 +32,7 @@ def test_terms_that_are_there_are_found(material: Material, effects: set[str]) -
         assert select_model(observed(material, FREQUENCY, 0.02, seed), 0.01).chosen.effects == effects
 
 
+@pytest.mark.validate
 def test_the_number_of_branches_is_found() -> None:
     two = Material(100e9, 0.05e9, (MaxwellBranch(25e9, 0.03), MaxwellBranch(25e9, 1.0)))
     result = select_model(observed(two, np.geomspace(0.05, 50.0, 16), 0.01, seed=1), 0.01)
@@ -39,6 +40,7 @@ def test_the_number_of_branches_is_found() -> None:
     assert result.evidence("relaxation") > 100.0
 
 
+@pytest.mark.validate
 def test_a_delay_of_the_channels_is_a_rival_of_damping() -> None:
     # Below the rope's own frequencies the two differ only in a storage modulus that falls by a cosine.
     late = Material(100e9, delay=1e-3)

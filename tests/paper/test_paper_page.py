@@ -40,6 +40,7 @@ def _page(tmp_path) -> str:  # type: ignore[no-untyped-def]
     return paper_page(content, {"claims.json": "claims.json"})
 
 
+@pytest.mark.validate
 def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) -> None:  # type: ignore[no-untyped-def]
     page = _page(tmp_path)
     assert len(page.encode()) < MAX_PAGE_BYTES

@@ -35,6 +35,7 @@ def test_loops_have_the_complex_modulus_of_the_rope() -> None:
         assert loop.load[-1] == pytest.approx(loop.load[0], abs=1.0), "a loop closes"
 
 
+@pytest.mark.validate
 def test_elastic_rope_returns_its_modulus_by_equation_7() -> None:
     runs = run_tensile_and_dynamic_tests(printed_rope())
     assert tensile_modulus(runs.tensile, METALLIC_AREA) == pytest.approx(102.2e9, rel=1e-6)

@@ -61,6 +61,7 @@ def code_of(page: str) -> dict[str, str]:
     return {title or str(number): code for number, (title, code) in enumerate(blocks)}
 
 
+@pytest.mark.validate(but=["index.md"])
 @pytest.mark.parametrize("page", ["index.md", "linear.md", "gallery.md"])
 def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -87,6 +88,7 @@ def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytes
     assert abs(uncompensated.position - shaped_path.position(uncompensated.time)).max() > 1e-3
 
 
+@pytest.mark.validate
 def test_examples_of_the_fmus_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     # The page replaces a function of FMPy.

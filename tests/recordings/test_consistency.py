@@ -71,7 +71,7 @@ def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str
     assert "the run starts there too" in notes[0]
 
 
-@pytest.mark.validate(but=["effects4"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     "effects",
     [
@@ -147,6 +147,7 @@ def test_time_in_milliseconds_is_told_without_positions() -> None:
     assert "check that time is in s" in error.hint
 
 
+@pytest.mark.validate(but=["simulate"])
 @pytest.mark.parametrize("command", ["trace", "simulate", "check"])
 def test_commands_tell_of_another_robots_recording(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
@@ -162,6 +163,7 @@ def test_commands_tell_of_another_robots_recording(
     assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()
 
 
+@pytest.mark.validate(but=["1.0"])
 @pytest.mark.parametrize("unit", [1.0, 1e-3])
 def test_lengths_in_the_columns_of_speeds_are_told(unit: float) -> None:
     recording = of("three")
@@ -171,6 +173,7 @@ def test_lengths_in_the_columns_of_speeds_are_told(unit: float) -> None:
     assert f"name them rope_length_1 to rope_length_3; 1 of theirs is about {unit:g} m of rope" in error.hint
 
 
+@pytest.mark.validate
 def test_times_that_count_samples_are_told_with_the_interval() -> None:
     recording = of("three")
     (error,) = recording_mistakes(THREE, replace(recording, time=np.arange(recording.sample_count) + 0.0))

@@ -269,6 +269,7 @@ DIALECTS = st.builds(
 )
 
 
+@pytest.mark.validate
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     dialect=DIALECTS, rows=st.lists(st.tuples(FIGURE, FIGURE, FIGURE), min_size=2, max_size=5), step=st.floats(0.01, 9)

@@ -228,6 +228,7 @@ def test_only_whoever_needs_outputs_asks_for_them(tmp_path: Path) -> None:
     require_outputs(read(tmp_path, PLAIN))
 
 
+@pytest.mark.validate
 def test_long_recordings_are_read_whole(tmp_path: Path) -> None:
     count = 50_000
     values = np.column_stack([np.arange(count) * 0.01, np.random.default_rng(1).normal(size=(count, 9))])

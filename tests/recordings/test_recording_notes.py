@@ -48,6 +48,7 @@ def test_recordings_that_hide_nothing_of_the_kind_have_no_note(name: str, has_te
     assert recording_notes(robot, recording if has_tension else without_tensions(recording)) == ()
 
 
+@pytest.mark.validate(but=["'damping'", "'sensor_gain'"])
 @pytest.mark.parametrize(
     ("name", "effects"),
     [
@@ -62,6 +63,7 @@ def test_other_effects_are_not_taken_for_scales_or_lags(name: str, effects: dict
     assert notes(name, effects) == ()
 
 
+@pytest.mark.validate
 def test_a_drum_of_another_radius_on_all_winches_is_told_with_each_factor() -> None:
     (note,) = notes("caroca", {"drum": {"radius_ratio": 0.94}})
     assert numbers(note)[:4] == pytest.approx([0.94, 0.94, 0.94, 0.001], abs=2e-3)
@@ -73,6 +75,7 @@ def test_a_drum_of_another_radius_on_all_winches_is_told_with_each_factor() -> N
     assert kinematic_scale_notes(replace(robot, effects=(drum,)), recording) == ()
 
 
+@pytest.mark.validate(but=["False"])
 @pytest.mark.parametrize("name", ["three", "caroca"])
 @pytest.mark.parametrize("has_tension", [True, False])
 def test_one_drum_that_is_far_off_is_told_alone(name: str, has_tension: bool) -> None:
@@ -81,12 +84,14 @@ def test_one_drum_that_is_far_off_is_told_alone(name: str, has_tension: bool) ->
     assert numbers(note)[0] == pytest.approx(0.7, abs=0.01) and "of what winch 2 wound: a drum of another" in note
 
 
+@pytest.mark.validate
 def test_a_pulley_is_no_scale() -> None:
     robot = example("eight").as_modelled()
     pulleys = recorded("eight", 3, {"pulley": {"radius": 0.3}})
     assert not any("rope moves" in note for note in recording_notes(robot, pulleys))
 
 
+@pytest.mark.validate
 def test_a_survey_that_makes_a_scale_itself_hides_it() -> None:
     robot, recording = example("caroca").as_modelled(), recorded("caroca", 3, {"drum": {"radius_ratio": 1.03}})
     surveyed = replace(robot, cables=tuple(replace(cable, anchor_uncertainty=0.3) for cable in robot.cables))
@@ -94,6 +99,7 @@ def test_a_survey_that_makes_a_scale_itself_hides_it() -> None:
     assert recording_notes(surveyed, recording) == ()
 
 
+@pytest.mark.validate
 def test_a_sensor_delay_of_the_positions_is_told_with_its_lag() -> None:
     (note,) = notes("caroca", {"sensor_delay": {"seconds": 0.12, "outputs": "position"}})
     assert numbers(note)[0] == pytest.approx(0.12, abs=1e-3)
@@ -116,6 +122,7 @@ def test_positions_that_are_late_by_less_than_two_samples_are_not_told() -> None
     assert recording_notes(robot, late) == ()
 
 
+@pytest.mark.validate
 def test_positions_that_are_early_are_another_clock() -> None:
     recording = recorded("caroca", 3)
     early = replace(recording.part(0, recording.sample_count - 20), position=recording.position[20:])
@@ -132,6 +139,7 @@ def test_a_lag_beside_drums_of_another_radius_is_told_beside_their_scale() -> No
     assert numbers(scale)[:8] == pytest.approx([1.06] * 8, abs=6e-3)
 
 
+@pytest.mark.validate(only=["0.5-eight"])
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
 @pytest.mark.parametrize(("factor", "payload"), [(0.5, -0.5), (1.1, 0.1)])
 def test_a_gain_of_all_load_cells_is_told_as_gain_or_payload(name: str, factor: float, payload: float) -> None:
@@ -144,6 +152,7 @@ def test_a_gain_of_all_load_cells_is_told_as_gain_or_payload(name: str, factor: 
     assert "which statics alone cannot tell apart" in note
 
 
+@pytest.mark.validate
 def test_load_cells_that_all_show_too_little_are_told_with_the_offset() -> None:
     robot, recording = example("three").as_modelled(), recorded("three", 3, {"sensor_offset": {"force": -120.0}})
     (note,) = recording_notes(robot, recording)
@@ -179,6 +188,7 @@ def with_effect(robot: Robot, name: str) -> Robot:
     return replace(robot, effects=(EffectSetting(name, {}),))
 
 
+@pytest.mark.validate
 def test_effects_that_the_robot_file_declares_are_not_told_again() -> None:
     robot = example("caroca").as_modelled()
     wound = recorded("caroca", 3, {"drum": {"radius_ratio": 0.94}})
@@ -187,6 +197,7 @@ def test_effects_that_the_robot_file_declares_are_not_told_again() -> None:
     assert recording_notes(with_effect(robot, "payload"), carried) == ()
 
 
+@pytest.mark.validate
 def test_poses_inside_a_pulley_have_no_note_and_winches_that_stand_one_of_their_own() -> None:
     robot, recording = example("eight").as_modelled(), read_recording(EXAMPLES / "eight" / "check.csv", 8)
     inside = replace(robot, effects=(EffectSetting("pulley", {"radius": 0.1}, robot.cable_numbers),))
@@ -198,6 +209,7 @@ def test_poses_inside_a_pulley_have_no_note_and_winches_that_stand_one_of_their_
     assert "all winches stand" in note
 
 
+@pytest.mark.validate
 def test_travel_that_nothing_explains_is_noted_by_check(tmp_path: Path) -> None:
     robot, recording = example("three"), read_recording(EXAMPLES / "three" / "check.csv", 3)
     speeds = recording.winch_speed.copy()
@@ -208,6 +220,7 @@ def test_travel_that_nothing_explains_is_noted_by_check(tmp_path: Path) -> None:
     assert any("that of cable 2 most" in note for note in check_files(EXAMPLES / "three" / "robot.toml", file).notes)
 
 
+@pytest.mark.validate
 def test_check_says_the_scale_of_a_winch(tmp_path: Path) -> None:
     recording = recorded("three", 3, {"drum": {"radius_ratio": 0.7, "cables": [2]}})
     file = tmp_path / "log.csv"
@@ -216,6 +229,7 @@ def test_check_says_the_scale_of_a_winch(tmp_path: Path) -> None:
     assert checked.problems == () and any("rope moves 0.699" in note for note in checked.notes)
 
 
+@pytest.mark.validate(but=["check"])
 @pytest.mark.skipif(not SHARED_RECORDINGS.is_dir(), reason="recordings that do not ship with the project")
 @pytest.mark.parametrize("which", ["fit", "check"])
 def test_drums_of_a_measured_robot_are_told(which: str) -> None:
@@ -226,6 +240,7 @@ def test_drums_of_a_measured_robot_are_told(which: str) -> None:
     assert numbers(note)[:4] == pytest.approx([0.9415, 0.9363, 0.9432, 0.9390], abs=5e-3)
 
 
+@pytest.mark.validate
 def test_what_no_drum_does_is_no_scale() -> None:
     """Of positions in reverse, and of a tracker that shows one position."""
     robot, recording = example("cogiro"), read_recording(EXAMPLES / "cogiro" / "fit.csv", 8)

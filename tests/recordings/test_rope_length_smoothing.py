@@ -48,6 +48,7 @@ def smoothings(recording: Recording) -> list[LengthSmoothing]:
     return [each for each in every if each is not None]
 
 
+@pytest.mark.validate
 def test_the_error_that_is_stated_is_the_one_that_is_left() -> None:
     recording = log(counted(COUNT))
     stated = smoothings(recording)
@@ -56,6 +57,7 @@ def test_the_error_that_is_stated_is_the_one_that_is_left() -> None:
     assert np.all(left < 0.45 * COUNT / np.sqrt(12.0))
 
 
+@pytest.mark.validate
 def test_its_bandwidth_is_that_of_a_process_with_the_same_memory() -> None:
     noise = 3e-5 * np.random.default_rng(1).standard_normal((len(TIMES), 2))
     stated = smoothings(log(lengths() + noise))
@@ -92,6 +94,7 @@ def test_a_count_shows_in_third_differences() -> None:
     assert length_noise(noisy) == pytest.approx(5e-5, rel=0.1)
 
 
+@pytest.mark.validate
 def test_a_long_rest_before_the_motion_does_not_smooth_the_motion() -> None:
     rest = np.repeat(counted(COUNT)[:1], 20_000, axis=0)
     times = INTERVAL * np.arange(20_000 + len(TIMES))

@@ -62,6 +62,7 @@ def split_files(folder: Path, offset: float = 3.412, rate: float = 1.0) -> tuple
     return recording, log, written(tracker, folder)
 
 
+@pytest.mark.validate(but=["3.412"])
 @pytest.mark.parametrize(("offset", "rate"), [(3.412, 1.0), (250.0, 1.0003)])
 def test_log_and_tracker_become_the_recording_that_was_split(offset: float, rate: float, tmp_path: Path) -> None:
     recording, log, path = split_files(tmp_path, offset, rate)
@@ -92,6 +93,7 @@ def test_a_log_with_positions_is_refused(tmp_path: Path) -> None:
         with_tracker(replace(ROBOT, tracker=Tracker(COLUMNS)), recording, path)
 
 
+@pytest.mark.validate
 def test_a_log_of_counts_is_refused_before_its_tracker_is(tmp_path: Path) -> None:
     _, log, path = split_files(tmp_path)
     counts = replace(log, winch_speed=1e4 * log.winch_speed, rope_length=-1e4 * log.wound_lengths())

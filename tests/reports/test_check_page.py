@@ -65,6 +65,7 @@ def test_panels_hold_what_was_recorded_and_what_balances(fit_page: Page) -> None
     assert measured == pytest.approx(balanced, rel=0.05)
 
 
+@pytest.mark.validate
 def test_problem_of_speeds_in_mm_per_second_stands_on_the_page_with_what_mends_it(tmp_path: Path) -> None:
     recorded, wrong = pd.read_csv(FIT), tmp_path / "wrong.csv"
     speeds = [name for name in recorded if name.startswith("winch_speed_")]

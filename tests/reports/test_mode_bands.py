@@ -20,6 +20,7 @@ from tests.support.robots import example
 from tests.support.traces import made_trace
 
 
+@pytest.mark.validate
 def test_bands_span_the_modes_along_the_path() -> None:
     robot = example("three")
     path = np.linspace((28.86, 0.0, 5.0), (35.0, 4.0, 12.0), 400)
@@ -29,6 +30,7 @@ def test_bands_span_the_modes_along_the_path() -> None:
     assert max(band.high for band in bands) == pytest.approx(frequencies.max(), rel=0.01)
 
 
+@pytest.mark.validate
 def test_bands_of_a_rigid_platform_are_those_at_its_orientation_on_the_way() -> None:
     robot, position = crane_robot(), np.tile(crane_robot().platform.start, (5, 1))
     turned = np.roll(Rotation.from_rotvec((0.0, 0.0, 0.5)).as_quat(), 1)

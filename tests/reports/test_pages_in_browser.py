@@ -89,7 +89,7 @@ def test_planar_robot_faces_the_reader_and_fills_the_figure(
     assert views == ["Whole", "Close up"] and browser.heard() == []
 
 
-@pytest.mark.validate(but=["trace-laptop"])
+@pytest.mark.validate
 @pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_plot_is_empty(browser: Browser, pages: dict[str, Path], kind: str, screen: Screen) -> None:
@@ -105,7 +105,7 @@ def test_no_plot_is_empty(browser: Browser, pages: dict[str, Path], kind: str, s
         assert near(picture, accent) > 20, place
 
 
-@pytest.mark.validate(but=["trace"])
+@pytest.mark.validate
 @pytest.mark.parametrize("kind", KINDS)
 def test_slider_moves_the_robot(browser: Browser, pages: dict[str, Path], kind: str) -> None:
     opened(browser, pages[kind]).see("figure.scene")

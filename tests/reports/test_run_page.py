@@ -92,6 +92,7 @@ def test_recorded_path_of_a_robot_measured_in_a_plane_lies_in_that_plane() -> No
     assert recorded[1] == simulated[1] and recorded[0] != simulated[0]
 
 
+@pytest.mark.validate
 def test_page_stays_small_for_long_runs() -> None:
     assert len(run_page(made_run(samples=40_000, eight=True), {})) < MAX_PAGE_BYTES
 

@@ -160,6 +160,7 @@ def test_plotly_is_there_once_and_packed() -> None:
     assert "plotly.js (gl3d - minified) v4" in gzip.decompress(base64.b64decode(scripts[1])).decode()[:200]
 
 
+@pytest.mark.validate(but=["False"])
 @pytest.mark.parametrize("eight", [False, True])
 def test_page_stays_small_for_long_recordings(eight: bool) -> None:
     assert len(trace_page(made_trace(eight, samples=120_000), LINKS).encode()) < MAX_PAGE_BYTES
@@ -307,6 +308,7 @@ def test_packing_keeps_numbers_and_turns_the_infinite_into_gaps() -> None:
     )
 
 
+@pytest.mark.validate
 def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path) -> None:
     trace = made_trace(samples=200)
     provenance = Provenance("0.1.0", "tautwire trace '<b>.toml'", "2026-01-02T03:04:05Z", {"<b>.toml": "ab" * 32})

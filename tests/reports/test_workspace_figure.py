@@ -12,6 +12,7 @@ from tests.support.rigid_robots import crane_robot
 from tests.support.robots import example
 
 
+@pytest.mark.validate
 def test_three_slices_through_the_start_show_the_margin() -> None:
     robot = example("caroca")
     workspace = wrench_feasible_workspace(robot, spacing=0.5)

@@ -159,6 +159,7 @@ def test_a_tilted_pulley_turns_the_way_round_with_it() -> None:
     assert leant.start_direction == pytest.approx(plain.start_direction @ turn.T, abs=1e-12)
 
 
+@pytest.mark.validate
 def test_fast_relaxation_is_damping() -> None:
     times = np.arange(0, 5, 0.1)
     one = simulate(damped(), {"relaxation": {"modulus": 1e12, "time": 1e-3}}, RAMP, times)
@@ -194,6 +195,7 @@ def test_hysteresis_follows_the_strain_and_not_the_clock() -> None:
     assert memory_after(4e-3, 0.5) == pytest.approx(1 - np.exp(-2.0), rel=1e-8)
 
 
+@pytest.mark.validate
 def test_hysteresis_takes_energy_from_a_free_swing() -> None:
     kick = [0.0, 0.0, 0.3]
     effects = {"hysteresis": {"force": 60.0, "yield_strain": 1e-4}}

@@ -93,6 +93,7 @@ def test_a_planar_robot_moves_and_is_shaken_in_its_plane_alone(cables: int) -> N
     assert np.abs(rig.evaluate(0.0, rig.begin()).acceleration).max() < 1e-9
 
 
+@pytest.mark.validate
 def test_designs_are_of_all_sizes_and_numbers_of_cables() -> None:
     made = [design(chance(seed)) for seed in range(40)]
     assert {one.robot.count for one in made} == set(LEVELS)
@@ -213,6 +214,7 @@ def test_the_hidden_thing_shows_clearly_beside_the_little_ones(short: Case) -> N
     assert "friction" not in short.truth["minor"]
 
 
+@pytest.mark.validate
 def test_the_truth_is_what_the_recordings_differ_by(short: Case) -> None:
     empty = lifelike(3, cables=3, planar=False, duration=6.0, rate=50.0)
     assert "friction" not in empty.truth["minor"]
@@ -224,6 +226,7 @@ def test_the_truth_is_what_the_recordings_differ_by(short: Case) -> None:
         assert np.sqrt(np.nanmean(apart[["x", "y", "z"]].to_numpy() ** 2)) == pytest.approx(place, abs=1e-9)
 
 
+@pytest.mark.validate
 def test_a_seed_gives_the_same_files_again_and_another_gives_others(tmp_path: Path) -> None:
     cases = [lifelike(seed, duration=4.0, rate=50.0, cables=3, planar=False) for seed in (7, 7, 8)]
     for index, case in enumerate(cases):

@@ -38,6 +38,7 @@ class Helix:
         return start - np.linalg.norm(self.robot.anchors - self.path(time)[0], axis=1)
 
 
+@pytest.mark.validate
 def test_elongations_of_both_laws_differ_on_the_helix_as_the_paper_says() -> None:
     robot = paper_robot(1.022e11)
     helix = Helix(robot)

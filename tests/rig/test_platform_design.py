@@ -46,6 +46,7 @@ def short() -> Case:
     return lifelike(5, ["rotational_drag"], cables=8, duration=3.0, rate=50.0, turning=True, exact=True)
 
 
+@pytest.mark.validate(but=["4"])
 @pytest.mark.parametrize("cables", [4, 8])
 def test_platforms_rest_at_their_start_and_have_modes_that_fixed_steps_follow(cables: int) -> None:
     for seed in range(4):
@@ -98,6 +99,7 @@ def test_platforms_turn_as_far_as_they_are_led() -> None:
     assert 0.1 * TILT < 2.0 * max(turned) < 1.5 * TILT
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("cables", [4, 8])
 def test_a_log_shows_the_orientation_with_the_trackers_noise_and_gaps(cables: int) -> None:
     lot = lot_of(4, cables, tracker=Tracker(dropouts=120.0), place=Memory(0.0, 1.0))
@@ -113,6 +115,7 @@ def test_a_log_shows_the_orientation_with_the_trackers_noise_and_gaps(cables: in
     assert errors.as_rotvec().std() == pytest.approx(lot.design.robot.noise.orientation, rel=0.15)
 
 
+@pytest.mark.validate
 def test_little_things_turn_a_platform_too() -> None:
     lot = lot_of(4, 8)
     session = Session(lot, 1, 2.0, 50.0)

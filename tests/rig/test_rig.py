@@ -186,6 +186,7 @@ def test_integration_converges_on_itself() -> None:
     assert np.abs(coarse.cell - fine.cell).max() < 1e-3
 
 
+@pytest.mark.validate
 def test_two_integration_methods_agree() -> None:
     robot = replace(paper_robot(), damping=np.full(3, 4e8))
     one = simulate(robot, {}, RAMP, [0.0, 7.0])
@@ -220,6 +221,7 @@ def test_travel_of_every_program_is_the_integral_of_its_speed() -> None:
         assert program.travel(9.0) == pytest.approx(integral, abs=1e-6)
 
 
+@pytest.mark.validate
 def test_wandering_program_starts_at_rest_and_keeps_ropes_tight() -> None:
     robot = replace(eight_robot(), damping=np.full(8, 3e8))
     program = wander(robot, 7, 1.0)
@@ -250,6 +252,7 @@ def test_recording_has_the_columns_of_the_format_and_only_its_noise_depends_on_t
     assert max(len(cell.lstrip("-").replace(".", "")) for cell in line.split(",")) <= 14
 
 
+@pytest.mark.validate
 def test_run_over_sampled_speeds_follows_the_smooth_program() -> None:
     robot = replace(paper_robot(), damping=np.full(3, 4e8))
     program = wander(robot, 3, 5.0)

@@ -73,6 +73,7 @@ def swung(robot: Robot, effects: dict[str, Any], duration: float = 1.0) -> Run:
     return simulate(robot, effects, StillProgram(robot.count), times, velocity=push, turning=spin)
 
 
+@pytest.mark.validate(but=["swing"])
 @pytest.mark.parametrize("make", ROBOTS.values(), ids=ROBOTS)
 def test_a_free_swing_keeps_its_energy(make: Callable[[], Robot]) -> None:
     found = energies(swung(undamped(make()), {}, 2.0))
@@ -106,6 +107,7 @@ def test_a_free_body_turns_as_eulers_equations_say() -> None:
     assert centre == pytest.approx(rig.turning.start @ rig.turning.body.centre, abs=1e-7)
 
 
+@pytest.mark.validate(only=["sag+pulley+payload"])
 @pytest.mark.parametrize(
     "effects",
     [

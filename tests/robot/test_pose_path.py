@@ -56,6 +56,7 @@ def test_a_path_without_orientation_keeps_that_of_the_start() -> None:
     assert np.array_equal(poses.twist[:, :3], line(robot).velocity(TIMES))
 
 
+@pytest.mark.validate
 def test_fewer_than_six_cables_pass_through_equilibria() -> None:
     robot = suspended_robot(3)
     path = pose_path(robot, line(robot))

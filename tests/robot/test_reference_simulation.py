@@ -31,6 +31,7 @@ def test_an_effect_is_that_of_the_rig(case: Case, name: str) -> None:
     assert position > 100.0 * position_error + 1e-8 or tension > 100.0 * tension_error + 1e-2
 
 
+@pytest.mark.validate(only=["eight", "radius+friction"])
 @pytest.mark.parametrize("name", ["three", SLOW_EIGHT])
 @pytest.mark.parametrize("cases", PAIRS, ids=lambda cases: "+".join(map(str, cases)))
 def test_effects_together_are_those_of_the_rig(cases: tuple[Case, ...], name: str) -> None:

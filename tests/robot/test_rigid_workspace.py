@@ -119,6 +119,7 @@ def test_accelerations_take_from_the_margin_and_angular_ones_too() -> None:
     assert all(held) == (margin >= 0.0)
 
 
+@pytest.mark.validate
 def test_a_symmetric_robot_has_a_symmetric_workspace() -> None:
     robot = replace(boxed_robot(), gravity=0.0)
     workspace = workspace_on(position_grid(robot, spacing=0.75), robot)

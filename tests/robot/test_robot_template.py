@@ -28,6 +28,7 @@ def test_it_reads_back_and_rests(tmp_path: Path, count: int) -> None:
     assert np.all(tensions > robot.tension.minimum) and np.all(tensions < robot.tension.maximum)
 
 
+@pytest.mark.validate(but=["3"])
 @pytest.mark.parametrize("count", [3, 6])
 def test_it_simulates(tmp_path: Path, count: int) -> None:
     place = tmp_path / "robot.toml"

@@ -23,6 +23,7 @@ def cross(limits: TensionLimits | None = None) -> Robot:
     return Robot("cross", 0.0, Platform(50.0, (0.0, 0.0, 0.0)), limits, Sensors(), cables)
 
 
+@pytest.mark.validate(only=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_where_statics_finds_tensions(name: str) -> None:
     robot = example(name)

@@ -130,7 +130,7 @@ def _run_stages(context: CampaignContext, job: Job, fmu_folder: Path) -> Iterabl
             {},
         )
     if plan.compute.modes:
-        yield _modal_outputs(robot, linearise(robot)), {}
+        yield _modal_outputs(robot, linearise(robot, swing=0.0)), {}
     if path_index >= 0 and context.bundle is not None:
         reference_input = context.reference_inputs.get(job.variant) or build_reference_input(
             _nominal_robot(robot, plan), plan.paths[path_index], controller, plan.compute, context.recordings

@@ -30,6 +30,6 @@ def with_controller_notes(plan: Plan) -> Plan:
 def _notes(robot: Robot, path: PathPlan, controller: str) -> tuple[str, ...]:
     # A robust design takes up to a minute, and keeps larger margins than are noted.
     if controller == "robust":
-        return reach_notes(reachable_plant(linearise(robot)))
+        return reach_notes(reachable_plant(linearise(robot, swing=0.0)))
     design = designed_controller(robot, path_trajectory(robot, path), controller)
     return design.notes if isinstance(design, Controller | ScheduledController) else ()

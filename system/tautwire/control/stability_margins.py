@@ -181,7 +181,7 @@ def margins_over(
     robots = [each for _, _, each in parameter_range.robots(robot, points)] if parameter_range else [robot]
     held = [None] * len(positions) if orientations is None else orientations.tolist()
     all_margins = [
-        margins_of(linearise(each, position, orientation=orientation), knot)
+        margins_of(linearise(each, position, 0.0, orientation), knot)
         for each in robots
         for knot, position, orientation in zip(knots, positions, held, strict=True)
     ]

@@ -104,8 +104,8 @@ def platforms_text(parameters: PaperParameters, records: Records) -> str:
     for name, title in TITLES.items():
         point, rigid = parameters.robots[name], robot_with_platform(parameters, name)
         sentences.append(
-            f"{title} has its modes at {_listed(linearise(rigid).modes.frequencies, 2)} Hz "
-            f"({_listed(linearise(point).modes.frequencies, 2)} Hz as a point mass), start tensions of "
+            f"{title} has its modes at {_listed(linearise(rigid, swing=0.0).modes.frequencies, 2)} Hz "
+            f"({_listed(linearise(point, swing=0.0).modes.frequencies, 2)} Hz as a point mass), start tensions of "
             f"{_range(static_tensions(rigid))} N ({_range(static_tensions(point))} N), and the laws differ by "
             f"{_gaps(records, f'{name} platform')} ({_gaps(records, name)})."
         )

@@ -59,6 +59,7 @@ def test_nothing_swings_where_nothing_does(effects: dict[str, Any]) -> None:
     assert seen(effects) == ()
 
 
+@pytest.mark.validate
 def test_sensors_that_fall_silent_for_good_are_no_matter() -> None:
     effects = {"unlisted_swing": {"mass": 20.0, "length": 2.0}}
     noise = estimate_noise(ROBOT, recorded("three", 3, effects))
@@ -70,6 +71,7 @@ def test_sensors_that_fall_silent_for_good_are_no_matter() -> None:
     assert found.on == ("fit", "check")
 
 
+@pytest.mark.validate
 def test_without_check_a_resonance_is_seen_in_fit_alone() -> None:
     fit = recorded("three", 3, {"unlisted_swing": {"mass": 20.0, "length": 0.5}})
     noise = estimate_noise(ROBOT, fit)

@@ -38,6 +38,7 @@ def runs() -> tuple[CosimulationResult, SmoothedPath, CableSimulation]:
         return motion, path, simulate_cable("cable_2", fmus.cables[1], path, speeds[:, 1])
 
 
+@pytest.mark.validate
 def test_alone_it_shows_the_tension_and_force_of_the_whole() -> None:
     motion, path, run = runs()
     assert np.max(np.abs(run.tension - motion.tension[:, 1])) < 0.02

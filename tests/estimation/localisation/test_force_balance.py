@@ -59,10 +59,12 @@ def noisy(seed: int) -> Array:
     return noise
 
 
+@pytest.mark.validate
 def test_under_the_forces_of_a_path_it_shows_its_acceleration() -> None:
     assert shown(example("three"), needed()) == pytest.approx(path().acceleration, abs=1e-9)
 
 
+@pytest.mark.validate
 def test_what_depends_on_the_motion_is_felt_along_the_path() -> None:
     braked = example("three").with_effect(EffectSetting("drag", {"drag_area": 30.0}))
     speed = np.linalg.norm(path().velocity, axis=1)[:, None]
@@ -71,6 +73,7 @@ def test_what_depends_on_the_motion_is_felt_along_the_path() -> None:
     assert np.max(np.abs(result - drag)[100:]) < 0.02 * np.max(np.abs(drag))
 
 
+@pytest.mark.validate
 def test_a_missing_tension_leaves_a_gap_and_no_more() -> None:
     forces = needed()
     forces[400:410, 1] = np.nan

@@ -139,6 +139,7 @@ def test_what_is_too_long_too_deep_or_looks_like_something_else_is_refused(text:
         parse_expression(text, NAMES)
 
 
+@pytest.mark.validate
 @given(st.text(max_size=60))
 @settings(max_examples=200, deadline=None)
 def test_any_text_is_read_or_refused(text: str) -> None:

@@ -51,6 +51,7 @@ def by_the_rig(name: str, time: np.ndarray, speed: np.ndarray) -> tuple[np.ndarr
     return outputs(Rig(rig_of(ROBOT), {f"unlisted_{name}": SAME[name][0]}, SampledProgram(time, speed)), time, EXACT)
 
 
+@pytest.mark.validate(but=["sideways"])
 @pytest.mark.parametrize("name", SAME)
 def test_a_formula_in_the_fmus_is_the_effect_of_the_rig(name: str, tmp_path: Path) -> None:
     time, speed = gentle_speeds(ROBOT, 1.0, 0.02)
@@ -71,6 +72,7 @@ def test_a_formula_in_memory_is_the_effect_of_the_rig(name: str) -> None:
     assert np.max(np.abs(run.tension - tension)) < 1e-4
 
 
+@pytest.mark.validate
 def test_formulas_of_one_place_add_up(tmp_path: Path) -> None:
     time, speed = gentle_speeds(ROBOT, 0.3, 0.02)
     parts = with_formulas(ROBOT, Formula("tension", "3e4*strain", (1, 3)), Formula("tension", "20*travel", (3,)))

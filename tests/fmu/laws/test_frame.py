@@ -85,6 +85,7 @@ def test_a_robot_file_may_have_it(tmp_path: Path) -> None:
     assert read_robot(tmp_path / "robot.toml").effects == robot.effects
 
 
+@pytest.mark.validate
 def test_the_robot_follows_the_rigs_whose_exit_points_are_light_masses_on_springs() -> None:
     declared = load_robot(EXAMPLES / "three" / "robot.toml")
     times = np.arange(0.0, 4.01, 0.02)

@@ -32,6 +32,7 @@ def test_a_c_program_runs_the_robot_without_python(tmp_path: Path) -> None:
     assert np.linalg.norm(np.array(shown) - run.position[-1]) < 0.5e-3
 
 
+@pytest.mark.validate
 def test_sixty_four_instances_in_eight_threads_give_the_same_bits(tmp_path: Path) -> None:
     robot = with_effects(paper_robot(), same("hysteresis", force=60.0, yield_strain=1e-4))
     folder = tmp_path / "cable"

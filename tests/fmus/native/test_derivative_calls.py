@@ -109,6 +109,7 @@ def running(path: Path, folder: Path) -> tuple[FMU3Slave, list[int], list[int]]:
     return fmu, outputs, inputs
 
 
+@pytest.mark.validate
 def test_by_fmi_3_they_are_the_same_and_the_adjoint_is_the_transpose(native_fmus: RobotFmus, tmp_path: Path) -> None:
     fmus = build_fmus(ROBOT, tmp_path, native=True, fmi=3)
     random = np.random.default_rng(7)

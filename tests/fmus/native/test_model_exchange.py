@@ -171,6 +171,7 @@ def platform_differences(robot: Robot, fmus: RobotFmus, left_out: Sequence[str] 
 LATE = ("tension", "tension_rate", *(f"measured_position.{axis}" for axis in AXES))
 
 
+@pytest.mark.validate
 def test_all_effects_together_are_those_of_python(tmp_path: Path) -> None:
     robot = with_effects(example("three"), *CASES)
     fmus = build_fmus(robot, tmp_path, native=True)
@@ -188,6 +189,7 @@ def test_each_effect_is_that_of_python(case: Case, tmp_path: Path) -> None:
     assert max(platform_differences(robot, fmus, left_out)) < SAME
 
 
+@pytest.mark.validate
 def test_a_quaternion_that_drifts_from_length_one_turns_the_same(tmp_path: Path) -> None:
     with in_model_exchange(build_fmus(crane_robot(), tmp_path, native=True).platform) as model:
         model.run()

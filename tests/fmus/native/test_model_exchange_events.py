@@ -157,6 +157,7 @@ def swaying(model: Model) -> Callable[[float, Array], Array]:
     return rates
 
 
+@pytest.mark.validate
 def test_a_position_that_lags_is_that_of_before_with_its_gain(tmp_path: Path) -> None:
     robot = with_effects(
         example("three"), same("sensor_delay", position_delay=DELAY), same("sensor_gain", position_gain=1.5)

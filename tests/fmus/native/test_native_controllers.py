@@ -48,6 +48,7 @@ def walk(path: Path, steps: tuple[float, ...]) -> NDArray[np.float64]:
     return np.array(rows)
 
 
+@pytest.mark.validate(but=["feedforward"])
 @pytest.mark.parametrize("kind", ["feedforward", "lqg", "scheduled", "limited"])
 def test_a_controller_asks_for_the_same_speeds_as_in_python(kind: str, tmp_path: Path) -> None:
     robot = example("three")
@@ -65,6 +66,7 @@ def test_a_controller_asks_for_the_same_speeds_as_in_python(kind: str, tmp_path:
     assert validate_fmu(str(native)) == []
 
 
+@pytest.mark.validate
 def test_a_controller_of_a_platform_that_turns_asks_for_the_same_speeds(tmp_path: Path) -> None:
     robot = crane_robot()
     x, y, z = robot.platform.start

@@ -72,6 +72,7 @@ def test_nothing_is_wrong_with_native_fmus(complete_fmus: tuple[RobotFmus, Robot
     assert [validate_fmu(str(path)) for path in complete_fmus[1].paths] == [[]] * 7
 
 
+@pytest.mark.validate
 def test_all_effects_together_run_as_in_python(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     time, speed = gentle_speeds(example("three"), 0.5, 0.02)
     python, native = (cosimulate(fmus, time, speed) for fmus in complete_fmus)

@@ -91,6 +91,7 @@ def test_each_effect_moves_it_as_in_python(effect: EffectSetting, tmp_path: Path
     assert difference(python.platform, native.platform) < SAME
 
 
+@pytest.mark.validate
 def test_coupled_to_cables_it_moves_as_in_python(tmp_path: Path) -> None:
     robot, time = suspended_robot(4), np.linspace(0.0, 0.4, 21)
     speed = np.outer(np.sin(8.0 * time) ** 2, [0.05, -0.02, 0.0, 0.01])
@@ -98,6 +99,7 @@ def test_coupled_to_cables_it_moves_as_in_python(tmp_path: Path) -> None:
     assert largest_difference(python, native) < COUPLED
 
 
+@pytest.mark.validate
 def test_its_description_is_that_of_python_and_valid(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     one, other = (fmpy.read_model_description(str(fmus.platform)) for fmus in complete_fmus)
     assert [(v.name, v.start, v.unit) for v in one.modelVariables] == [

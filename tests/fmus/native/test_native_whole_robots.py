@@ -100,6 +100,7 @@ def test_the_papers_ramp_of_seven_seconds_ends_where_the_rig_ends(
     assert np.max(np.abs(found[:, 6:9] - ramp[1])) < 1e-6
 
 
+@pytest.mark.validate(but=["0.14"])
 @pytest.mark.parametrize("step", [0.01, 0.14])
 def test_a_platform_that_turns_is_that_of_the_components(
     turning: Path, native_crane_fmus: RobotFmus, step: float
@@ -142,6 +143,7 @@ def test_nothing_is_wrong_with_its_description(complete: Path, turning: Path) ->
     assert [validate_fmu(str(path)) for path in (complete, turning)] == [[], []]
 
 
+@pytest.mark.validate
 def test_names_units_and_starts_are_those_of_the_components(complete: Path, turning: Path, tmp_path: Path) -> None:
     parts = build_fmus(COMPLETE, tmp_path, native=True, co_simulation_only=True).by_component
     whole = {v.name: v for v in fmpy.read_model_description(str(complete)).modelVariables}

@@ -106,6 +106,7 @@ def derivatives_of_cable(slave: Cable) -> Array:
     return np.array(columns).T
 
 
+@pytest.mark.validate(only=["several-set"])
 @pytest.mark.parametrize("inputs_are_set", [True, False], ids=["set", "extrapolated"])
 @pytest.mark.parametrize("name", ["plain", "several"])
 def test_those_of_a_cable_are_those_of_its_law(
@@ -141,6 +142,7 @@ def derivatives_of_platform(slave: Slave) -> Array:
     return np.array(columns).T
 
 
+@pytest.mark.validate(but=["several"])
 @pytest.mark.parametrize(
     ("name", "kind", "base"),
     [

@@ -101,7 +101,7 @@ def _modal_frequencies(robot: Robot) -> Array:
         # Imported here: python-control takes half a second, and few commands that estimate need it.
         from ...linear import linearise
 
-        return linearise(robot).modes.frequencies
+        return linearise(robot, swing=0.0).modes.frequencies
     except TautwireError:
         return np.zeros(0)
 
