@@ -45,9 +45,21 @@ def robot_named(name: str) -> Robot:
     return read_robot(EXAMPLES / name / "robot.toml")
 
 
+class BuiltOnDemand(dict[str, RobotFmus]):
+    """FMUs of robots by name, each built when it is first asked for."""
+
+    def __init__(self, factory: pytest.TempPathFactory) -> None:
+        super().__init__()
+        self._factory = factory
+
+    def __missing__(self, name: str) -> RobotFmus:
+        self[name] = build_fmus(robot_named(name), self._factory.mktemp(name), native=True)
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[str, RobotFmus]:
-    return {name: build_fmus(robot_named(name), tmp_path_factory.mktemp(name), native=True) for name in NAMES}
+    return BuiltOnDemand(tmp_path_factory)
 
 
 def off_nominal(robot: Robot, modulus: float, mass: float) -> Robot:
@@ -190,10 +202,10 @@ def test_path_that_asks_a_cable_to_push_is_refused(fmus: dict[str, RobotFmus]) -
         cosimulate_closed_loop(fmus["three"], robot, design_controller(robot), away, 30.0)
 
 
-def test_controller_of_another_robot_is_refused(fmus: dict[str, RobotFmus]) -> None:
+def test_controller_of_another_robot_is_refused(eight_fmus: RobotFmus) -> None:
     three = robot_named("three")
     with pytest.raises(InputError, match="three: has 3 cables, the controller 3, the FMUs 8; give those of one robot"):
-        cosimulate_closed_loop(fmus["eight"], three, design_controller(three), PATHS["three"], 1.0)
+        cosimulate_closed_loop(eight_fmus, three, design_controller(three), PATHS["three"], 1.0)
 
 
 @pytest.mark.validate

@@ -86,8 +86,8 @@ def test_a_result_tells_what_the_winches_did(native_winch_fmus: RobotFmus) -> No
     assert list(motion.frame().columns[-3:]) == ["winch_speed_1", "winch_speed_2", "winch_speed_3"]
 
 
-def test_winches_go_first(native_winch_fmus: RobotFmus) -> None:
-    with instantiate_robot(native_winch_fmus) as graph:
+def test_winches_go_first(winch_fmus: RobotFmus) -> None:
+    with instantiate_robot(winch_fmus) as graph:
         assert [instance.component.name[:5] for instance in graph.instances] == [
             *["winch"] * 3,
             *["cable"] * 3,
@@ -124,10 +124,10 @@ def test_the_controller_holds_its_path_through_winches_of_ten_hertz(tmp_path: Pa
     assert errors[0][-1] < 2e-5
 
 
-def test_the_archive_has_them_and_asks_them_for_their_speeds(native_winch_fmus: RobotFmus, tmp_path: Path) -> None:
+def test_the_archive_has_them_and_asks_them_for_their_speeds(winch_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = with_winch(paper_robot(), LIMITED)
-    description = read_ssd(str(write_ssp(robot, native_winch_fmus, tmp_path / ssp_name(robot))))
-    assert [part.name for part in description.system.elements] == list(native_winch_fmus.by_component)
+    description = read_ssd(str(write_ssp(robot, winch_fmus, tmp_path / ssp_name(robot))))
+    assert [part.name for part in description.system.elements] == list(winch_fmus.by_component)
     ends = {
         (wire.startElement, wire.startConnector, wire.endElement, wire.endConnector)
         for wire in description.system.connections

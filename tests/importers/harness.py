@@ -75,8 +75,11 @@ IMPORTERS = (
 )
 
 
-def prepare(robot: Robot, folder: Path, native: bool = False) -> None:
-    """Write FMUs, driver, archive and ``run.json`` into ``folder``; the driver is of Python even beside native FMUs."""
+def prepare(robot: Robot, folder: Path, native: bool = False, stop: float = STOP) -> None:
+    """Write FMUs, driver, archive and ``run.json`` into ``folder``, for a run until ``stop`` (s).
+
+    The driver is of Python even beside native FMUs.
+    """
     fmus = build_fmus(robot, folder, native=native)
     files = {PLATFORM: fmus.platform.name}
     files |= {cable_name(number): path.name for number, path in enumerate(fmus.cables, start=1)}
@@ -94,7 +97,7 @@ def prepare(robot: Robot, folder: Path, native: bool = False) -> None:
         "connections": wires,
         "shown": PLATFORM,
         "position": [f"position.{axis}" for axis in AXES],
-        "stop": STOP,
+        "stop": stop,
         "archive": archive.name,
         "components_only": _unpack(archive, folder / "components_only").name,
     }
@@ -113,9 +116,9 @@ def _unpack(archive: Path, folder: Path) -> Path:
     return folder
 
 
-def exact_end(robot: Robot) -> np.ndarray:
-    """Where the platform is at the end of the run, in m, by the robot as one model."""
-    corners = np.unique([0.0, *(LIMIT / abs(rate) for rate in RAMP), STOP])
+def exact_end(robot: Robot, stop: float = STOP) -> np.ndarray:
+    """Where the platform is at the end of a run until ``stop`` (s), in m, by the robot as one model."""
+    corners = np.unique([0.0, *(LIMIT / abs(rate) for rate in RAMP if LIMIT / abs(rate) < stop), stop])
     speeds = np.clip(np.array(RAMP) * corners[:, None], -LIMIT, LIMIT)
     return integrate(robot, corners, speeds, 1e-12, 1e-13).position[-1]
 

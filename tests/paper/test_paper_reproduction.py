@@ -20,6 +20,7 @@ from tautwire.paper.paper_figures import draw_time_figures
 from tautwire.paper.paper_page import SECTION_FIGURES
 from tautwire.paper.paper_reproduction import PaperReproduction
 from tautwire.paper.ramp_runs import remaining_amplitude
+from tautwire.paper.rigid_platforms import draw_platforms, largest_law_difference, platforms_text
 from tautwire.paper.simulation_records import Records, max_abs
 from tests.rig import RampProgram, paper_robot, simulate
 
@@ -253,3 +254,22 @@ def test_eight_cables_follow_the_helix_within_their_limits(records: Records) -> 
     tensions = np.array([distributed[f"tension_{cable}"] for cable in range(1, 9)])
     assert TENSION_LIMITS.minimum < tensions.min() and tensions.max() < TENSION_LIMITS.maximum
     assert max_abs(distributed["error_norm"]) < 0.002 < 0.1 < max_abs(rigid["error_norm"])
+
+
+@pytest.mark.parametrize(
+    ("robot", "newtons", "millimetres"),
+    [("caroca", 0.22, 0.075), ("caroca platform", 30.0, 0.050), ("fast", 66.0, 15.5), ("fast platform", 168.0, 3.4)],
+)
+def test_the_laws_differ_with_platforms_that_turn_as_the_page_says(
+    records: Records, robot: str, newtons: float, millimetres: float
+) -> None:
+    assert max_abs(largest_law_difference(records, robot, "tension")) == pytest.approx(newtons, rel=0.03)
+    assert 1e3 * max_abs(largest_law_difference(records, robot, "elongation")) == pytest.approx(millimetres, rel=0.03)
+
+
+def test_figure_and_text_have_points_and_platforms_that_turn(paper: PaperReproduction, records: Records) -> None:
+    with figure_style():
+        panels = draw_platforms(records).figure.axes
+    assert [len(panel.lines) for panel in panels] == [2, 2, 2, 2]
+    text = platforms_text(paper.runs["corrected"].parameters, records)
+    assert "CAROCA has its modes at 12.09," in text and "FAST has its modes at 0.49," in text

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+from tautwire.errors import RecordingError
 from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.schema import Robot
@@ -24,10 +25,11 @@ def told_columns(hint: str, table: str = "recording.columns") -> dict[str, Any]:
     return parse_toml(told_lines(hint, table))
 
 
-def assert_mended_by_told_lines(robot: Robot, recording: Recording, folder: Path) -> None:
-    """The recording is refused as it is, and not with the lines that the message tells."""
+def assert_mended_by_told_lines(robot: Robot, recording: Recording, folder: Path) -> RecordingError:
+    """The recording is refused as it is, by the error returned, and not with the lines that its message tells."""
     file, columns = folder / "log.csv", folder / "columns.toml"
     recording.frame().dropna(axis="columns", how="all").to_csv(file, index=False)
     (error,) = recording_mistakes(robot, read_recording(file, robot.cable_count))
     columns.write_text(f"[recording.columns]\n{told_lines(error.hint)}\n", encoding="utf-8")
     assert recording_mistakes(robot, read_recording(file, robot.cable_count, columns)) == ()
+    return error
