@@ -130,7 +130,7 @@ def test_mode_across_a_single_cable_is_refused_by_name() -> None:
         design_controller(hung_point((0.0, 0.0, 2.0)))
 
 
-@pytest.mark.validate(but=["6"])
+@pytest.mark.validate
 @pytest.mark.parametrize("count", (3, 4, 6, 8))
 def test_undamped_turn_in_a_ring_of_cables_is_refused_by_name(count: int) -> None:
     message = r"suspended: has a mode of 1\.1 Hz, rotation about z, at \[0, 0, 1\.5\] m: no winch reaches it"

@@ -52,7 +52,7 @@ def limited_end() -> np.ndarray:
     return end_of(paper_robot(), LIMITED)
 
 
-@pytest.mark.validate(but=["0.02-1e-06"])
+@pytest.mark.validate
 @pytest.mark.parametrize(("step", "bound"), [(0.02, 1e-6), (0.01, 1e-7), (0.002, 1e-8)])
 def test_the_chain_ends_where_the_rig_ends_with_limits_on_the_way(
     native_winch_fmus: RobotFmus, limited_end: np.ndarray, step: float, bound: float

@@ -40,7 +40,7 @@ def test_statics_are_those_of_the_rig(robot: Robot, case: Case) -> None:
     assert static_tensions(with_effects(robot, case)) == pytest.approx(rig.start_tension, rel=1e-6)
 
 
-@pytest.mark.validate(but=["payload"])
+@pytest.mark.validate
 @pytest.mark.parametrize("case", [RIGID_CASES[0], same("payload", mass=6.0, x=0.1, y=-0.05)], ids=str)
 def test_the_orientation_at_the_start_is_that_of_the_rig(case: Case) -> None:
     robot = suspended_robot(4)

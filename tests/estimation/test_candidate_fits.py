@@ -55,7 +55,7 @@ def with_hysteresis(force: float, yield_strain: float) -> Robot:
     return ROBOT.with_effect(EffectSetting("hysteresis", values, ROBOT.cable_numbers))
 
 
-@pytest.mark.validate(but=["False"])
+@pytest.mark.validate
 @pytest.mark.parametrize(("fitted", "is_astray"), [((10.0, 7e-5), True), ((1e4, 1e-3), True), ((300.0, 1.2e-4), False)])
 def test_a_hysteresis_that_a_large_disturbance_led_astray_is_found_at_its_own_optimum(
     fitted: tuple[float, float], is_astray: bool

@@ -48,7 +48,7 @@ def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str,
     assert milliseconds(notes[1]) < 0.1
 
 
-@pytest.mark.validate(but=["tensions"])
+@pytest.mark.validate
 @pytest.mark.parametrize("kind", LATE)
 def test_a_sensor_that_is_late_in_both_is_left_to_the_effect(kind: str) -> None:
     evidence, notes, _ = clocks_set("three", recorded("three", 1, LATE[kind]), recorded("three", 2, LATE[kind]))

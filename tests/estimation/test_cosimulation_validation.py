@@ -35,6 +35,7 @@ def by_python(monkeypatch: pytest.MonkeyPatch) -> CosimulationResult:
         return motion()
 
 
+@pytest.mark.validate
 def test_machine_code_moves_as_python_does(by_python: CosimulationResult, monkeypatch: pytest.MonkeyPatch) -> None:
     sources = []
 

@@ -45,6 +45,7 @@ def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     assert found[SOFT].gain > slopes[VISCOUS].gain > 0.0
 
 
+@pytest.mark.validate
 def test_a_delay_of_more_than_half_a_period_of_a_mode_is_seen_by_a_run() -> None:
     context, fitter, sample = looked({"sensor_delay": {"seconds": 0.17}})
     slopes = score_test(context.robot, (), [LATE], fitter, sample)

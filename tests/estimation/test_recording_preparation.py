@@ -47,6 +47,7 @@ def noise_is_left(prepared: PreparedRecordings) -> bool:
     )
 
 
+@pytest.mark.validate
 def test_recordings_as_they_should_be_are_not_touched() -> None:
     pair = recorded("three", 1), recorded("three", 2)
     prepared = prepare_recordings(ROBOT, *pair)

@@ -142,7 +142,7 @@ def smooth(case: Case) -> bool:
 FIRST_FORMS = {case.name: case for case in reversed((*CASES, *UNLISTED_CASES)) if smooth(case)}.values()
 
 
-@pytest.mark.validate(but=["modulus"])
+@pytest.mark.validate
 @pytest.mark.parametrize("case", FIRST_FORMS, ids=str)
 def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path) -> None:
     robot = with_effects(paper_robot(damping=4e8), case)

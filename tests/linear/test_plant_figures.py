@@ -69,6 +69,7 @@ def test_modes_along_a_path_for_two_moduli() -> None:
     assert drawn(figure) > 10_000
 
 
+@pytest.mark.validate
 def test_no_figure_is_shown() -> None:
     before = plt.get_fignums()
     drawn(bode_figure(linearise(paper_robot()).system, "winch_speed_1", "tension_1"))

@@ -87,7 +87,7 @@ def test_the_largest_motion_along_a_shape_is_one_metre() -> None:
     assert np.linalg.norm(moved, axis=1).max(axis=0) == pytest.approx(np.ones(6))
 
 
-@pytest.mark.validate(but=["19"])
+@pytest.mark.validate
 @pytest.mark.skipif(not RINGDOWNS.is_dir(), reason="no shared recordings beside the project")
 @pytest.mark.parametrize("number", [1, 19, 37, 45, 49, 59])
 def test_free_modes_of_a_measured_robot_follow_from_its_geometry(number: int) -> None:

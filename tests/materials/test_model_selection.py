@@ -49,6 +49,7 @@ def test_a_delay_of_the_channels_is_a_rival_of_damping() -> None:
     assert ModelStructure(delay=True) in result.confusable_models(0.01)
 
 
+@pytest.mark.validate
 def test_amplitudes_identify_friction_of_one_stress() -> None:
     dry = Material(100e9, 0.1e9, friction_stress=3e6)
     amplitude = np.geomspace(6e-4, 1e-4, 8)

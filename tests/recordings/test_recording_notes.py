@@ -229,7 +229,7 @@ def test_check_says_the_scale_of_a_winch(tmp_path: Path) -> None:
     assert checked.problems == () and any("rope moves 0.699" in note for note in checked.notes)
 
 
-@pytest.mark.validate(but=["check"])
+@pytest.mark.validate
 @pytest.mark.skipif(not SHARED_RECORDINGS.is_dir(), reason="recordings that do not ship with the project")
 @pytest.mark.parametrize("which", ["fit", "check"])
 def test_drums_of_a_measured_robot_are_told(which: str) -> None:

@@ -46,7 +46,7 @@ def short() -> Case:
     return lifelike(5, ["rotational_drag"], cables=8, duration=3.0, rate=50.0, turning=True, exact=True)
 
 
-@pytest.mark.validate(but=["4"])
+@pytest.mark.validate
 @pytest.mark.parametrize("cables", [4, 8])
 def test_platforms_rest_at_their_start_and_have_modes_that_fixed_steps_follow(cables: int) -> None:
     for seed in range(4):

@@ -46,7 +46,7 @@ def test_ropes_hold_it_at_rest_as_they_hold_a_payload() -> None:
     assert np.max(np.abs(hanging.tension - plain.tension)) > 50.0
 
 
-@pytest.mark.validate(but=["payload"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", ["hanging_load", "payload"])
 def test_a_slow_pendulum_of_the_rig_is_it_where_the_platform_moves_fast(name: str) -> None:
     declared = load_robot(EXAMPLES / "three" / "robot.toml")

@@ -68,6 +68,7 @@ def test_variables_are_those_of_the_python_fmus(complete_fmus: tuple[RobotFmus, 
         assert not other.coSimulation.needsExecutionTool
 
 
+@pytest.mark.validate
 def test_nothing_is_wrong_with_native_fmus(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     assert [validate_fmu(str(path)) for path in complete_fmus[1].paths] == [[]] * 7
 
