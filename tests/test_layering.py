@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -39,8 +40,13 @@ LAYERS = (("errors",), FILES, ("validation",), *((room,) for room in ROOMS))
 LAYER_OF = {name: layer for layer, names in enumerate(LAYERS) for name in names}
 
 
-def imported_modules(file: Path, root: Path) -> Iterator[tuple[int, tuple[str, ...]]]:
+@cache
+def imported_modules(file: Path, root: Path) -> tuple[tuple[int, tuple[str, ...]], ...]:
     """Line and full dotted name of each import anywhere in a module; names imported from a package are appended."""
+    return tuple(_imported_modules(file, root))
+
+
+def _imported_modules(file: Path, root: Path) -> Iterator[tuple[int, tuple[str, ...]]]:
     package = file.relative_to(root).parts[:-1]
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):

@@ -115,9 +115,13 @@ WITHOUT_LINES = ("clocks apart", "a frame that is turned", "centre of mass")
 WITH_LINES = [mistake for mistake in MISTAKES if mistake not in WITHOUT_LINES]
 
 
+# Units alone are told alike of any number of cables; orders, signs, axes and frames are not.
+ON_EIGHT = [mistake for mistake in MISTAKES if " in " not in mistake or mistake == "axes in another order"]
+
+
 @pytest.mark.validate(but=["frame that is turned-three"])
 @pytest.mark.parametrize(
-    ("mistake", "name"), [*((each, "three") for each in WITHOUT_LINES[:2]), *((each, "eight") for each in MISTAKES)]
+    ("mistake", "name"), [*((each, "three") for each in WITHOUT_LINES[:2]), *((each, "eight") for each in ON_EIGHT)]
 )
 def test_a_mistake_is_told_with_its_cause_and_its_remedy(name: str, mistake: str) -> None:
     robot, recording = shipped(name)
