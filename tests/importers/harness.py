@@ -75,11 +75,8 @@ IMPORTERS = (
 )
 
 
-def prepare(robot: Robot, folder: Path, native: bool = False, stop: float = STOP) -> None:
-    """Write FMUs, driver, archive and ``run.json`` into ``folder``, for a run until ``stop`` (s).
-
-    The driver is of Python even beside native FMUs.
-    """
+def prepare(robot: Robot, folder: Path, native: bool = False) -> None:
+    """Write FMUs, driver, archive and ``run.json`` into ``folder``; the driver is of Python even beside native FMUs."""
     fmus = build_fmus(robot, folder, native=native)
     files = {PLATFORM: fmus.platform.name}
     files |= {cable_name(number): path.name for number, path in enumerate(fmus.cables, start=1)}
@@ -97,7 +94,7 @@ def prepare(robot: Robot, folder: Path, native: bool = False, stop: float = STOP
         "connections": wires,
         "shown": PLATFORM,
         "position": [f"position.{axis}" for axis in AXES],
-        "stop": stop,
+        "stop": STOP,
         "archive": archive.name,
         "components_only": _unpack(archive, folder / "components_only").name,
     }
@@ -116,9 +113,9 @@ def _unpack(archive: Path, folder: Path) -> Path:
     return folder
 
 
-def exact_end(robot: Robot, stop: float = STOP) -> np.ndarray:
-    """Where the platform is at the end of a run until ``stop`` (s), in m, by the robot as one model."""
-    corners = np.unique([0.0, *(LIMIT / abs(rate) for rate in RAMP if LIMIT / abs(rate) < stop), stop])
+def exact_end(robot: Robot) -> np.ndarray:
+    """Where the platform is at the end of the run, in m, by the robot as one model."""
+    corners = np.unique([0.0, *(LIMIT / abs(rate) for rate in RAMP), STOP])
     speeds = np.clip(np.array(RAMP) * corners[:, None], -LIMIT, LIMIT)
     return integrate(robot, corners, speeds, 1e-12, 1e-13).position[-1]
 
@@ -173,8 +170,10 @@ def _made(requirements: tuple[str, ...]) -> Path | NotInstallableError:
 
 def _install(venv: Path, python: Path, requirements: tuple[str, ...]) -> None:
     try:
-        _run([sys.executable, "-m", "venv", str(venv)], dict(os.environ), INSTALLING)
-        _run([str(venv / python), "-m", "pip", "install", "--quiet", *requirements], dict(os.environ), INSTALLING)
+        # A pip of its own and bytecode of modules that are never imported would take most of the time.
+        pip = [sys.executable, "-m", "pip", "--python", str(venv / python), "install", "--quiet", "--no-compile"]
+        _run([sys.executable, "-m", "venv", "--without-pip", str(venv)], dict(os.environ), INSTALLING)
+        _run([*pip, *requirements], dict(os.environ), INSTALLING)
     except (ClientError, subprocess.TimeoutExpired) as error:
         raise NotInstallableError(f"pip install {' '.join(requirements)}: {error}") from error
 

@@ -10,40 +10,35 @@ import pytest
 
 from tautwire.fmus.pythonfmu_builder import with_immediate_return
 from tests.importers.harness import IMPORTERS, Importer, NotInstallableError, exact_end, prepare, run_client
-from tests.importers.ramps import LIMIT, RAMP, STOP, acceleration, speed, winches
+from tests.importers.ramps import LIMIT, RAMP, acceleration, speed, winches
 from tests.support.robots import paper_robot
-
-# Until just behind the first winch's corner: importers take up to a tenth of a second for a step of FMUs of Python.
-ENDS = {"python": 3.5, "native": STOP}
 
 
 @pytest.fixture(scope="module", params=["python", "native"])
 def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run as all clients find it, with FMUs of either kind."""
     place = tmp_path_factory.mktemp("importers")
-    prepare(paper_robot(), place, request.param == "native", ENDS[request.param])
+    prepare(paper_robot(), place, native=request.param == "native")
     return place
 
 
 @pytest.fixture(scope="module")
-def exact() -> dict[str, np.ndarray]:
-    return {kind: exact_end(paper_robot(), stop) for kind, stop in ENDS.items()}
+def exact() -> np.ndarray:
+    return exact_end(paper_robot())
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: Path(importer.client).stem)
-@pytest.mark.parametrize(
-    ("folder", "kind", "step"), [("python", "python", 0.01), ("native", "native", 0.001)], indirect=["folder"]
-)
+@pytest.mark.parametrize(("folder", "step"), [("python", 0.01), ("native", 0.001)], indirect=["folder"])
 def test_an_importer_ends_where_the_robot_ends(
-    importer: Importer, kind: str, step: float, folder: Path, exact: dict[str, np.ndarray]
+    importer: Importer, step: float, folder: Path, exact: np.ndarray
 ) -> None:
     try:
         result = run_client(importer, folder, step)
     except NotInstallableError as reason:
         pytest.skip(str(reason))
-    assert result["steps"] == round(ENDS[kind] / step)
-    error = 1e3 * np.linalg.norm(np.array(result["position"]) - exact[kind])
+    assert result["steps"] == round(7.0 / step)
+    error = 1e3 * np.linalg.norm(np.array(result["position"]) - exact)
     assert np.isfinite(error)
     assert error <= importer.bounds[step], f"{error:.3g} mm"
 
