@@ -152,6 +152,7 @@ def without_time_for_effects(recordings: tuple[Recording, Recording]) -> Trace:
     return traced_until("round 1: score test", *recordings)
 
 
+@pytest.mark.validate
 def test_a_trace_without_time_for_effects_is_unexplained(without_time_for_effects: Trace) -> None:
     found = without_time_for_effects
     assert found.verdict == "unexplained"
@@ -162,6 +163,7 @@ def test_a_trace_without_time_for_effects_is_unexplained(without_time_for_effect
     assert found.seconds == 601.0
 
 
+@pytest.mark.validate
 def test_a_trace_without_time_for_effects_tells_where_the_error_sits(without_time_for_effects: Trace) -> None:
     assert "tensions of cables 1, 2, 3 deviate" in without_time_for_effects.components.sentence
     assert not [sentence for sentence in without_time_for_effects.untried if "component" in sentence]
@@ -241,6 +243,7 @@ def test_numbers_without_a_solution_end_in_an_error_that_can_be_read(
         trace(example("three"), *recordings)
 
 
+@pytest.mark.validate
 def test_the_report_tells_what_was_left(without_time_for_effects: Trace, tmp_path: Path) -> None:
     found = without_time_for_effects
     write_report(found, tmp_path)

@@ -206,6 +206,7 @@ def test_little_things_are_as_small_as_noise_and_named() -> None:
         assert set(lot.little.settings) <= set(CALLED)
 
 
+@pytest.mark.validate
 def test_the_hidden_thing_shows_clearly_beside_the_little_ones(short: Case) -> None:
     hidden, little = short.truth["size_of_hidden_rms"], short.truth["size_of_little_rms"]
     for role in ("fit", "check"):

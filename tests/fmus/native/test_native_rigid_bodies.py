@@ -80,6 +80,7 @@ def difference(one: Path, other: Path) -> float:
     return float(np.max(np.abs(rows[0] - rows[1]) / scale))
 
 
+@pytest.mark.validate
 def test_a_crane_with_all_effects_moves_as_in_python(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     assert difference(complete_fmus[0].platform, complete_fmus[1].platform) < SAME
 
@@ -108,6 +109,7 @@ def test_its_description_is_that_of_python_and_valid(complete_fmus: tuple[RobotF
     assert validate_fmu(str(complete_fmus[1].platform)) == []
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("values", [{"inertia__xy": 1e3}, {"start_orientation__w": 0.9}], ids=str)
 def test_an_impossible_body_is_refused(values: dict[str, float], complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     with in_hand(complete_fmus[1].platform) as platform:
@@ -116,6 +118,7 @@ def test_an_impossible_body_is_refused(values: dict[str, float], complete_fmus: 
             platform.run()
 
 
+@pytest.mark.validate
 def test_principal_axes_follow_an_inertia_that_is_tuned(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
     shown = []
     for fmus in complete_fmus:
