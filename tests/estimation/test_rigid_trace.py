@@ -40,7 +40,7 @@ def damped(robot: Robot, factor: float) -> Robot:
 def test_what_a_platform_that_turns_lacks_is_named_alone(
     declared: Robot, truth: Robot, effects: tuple[str, ...]
 ) -> None:
-    fit, check = (rigid_recording(truth, 300, seed=seed) for seed in (1, 2))
+    fit, check = (rigid_recording(truth, 150, seed=seed) for seed in (1, 2))
     result = trace(declared, fit, check)
     assert tuple(each.name for each in result.effects) == effects
     after = result.comparisons[-1].errors_after
