@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import ArgumentError, InputError, describe_value
+from .foreign_formats import foreign_format, utf_16_without_mark
 
 HEAD_SIZE = 2**16  # bytes, checked before the rest is read
 
@@ -49,18 +50,19 @@ def read_encoded_text(
 ) -> tuple[bytes, str]:
     """Reads a text file as UTF-8 without its byte order mark, and names the encoding that it had.
 
-    That is UTF-8, UTF-16 where the file begins with its mark, or else Latin-1, which any bytes are: the caller has to
-    limit where it is accepted. Raises ``error_class`` as :func:`read_text_bytes` does.
+    That is UTF-8, UTF-16 where the file begins with its mark or as ASCII does in it, or else Latin-1, which any bytes
+    are: the caller has to limit where it is accepted. Raises ``error_class`` as :func:`read_text_bytes` does.
     """
     with readable_file(path, error_class) as file, file.open("rb") as head_file:
         head = head_file.read(HEAD_SIZE)
-    if not head.startswith(_UTF_16_MARKS):
+    wide = "utf-16" if head.startswith(_UTF_16_MARKS) else utf_16_without_mark(head)
+    if wide is None:
         _refuse_binary(head, str(path), error_class, expected_format)
     content = read_bytes(path, error_class, max_size)
     encoding = "UTF-8"
-    if content.startswith(_UTF_16_MARKS):
+    if wide is not None:
         try:
-            content, encoding = content.decode("utf-16").encode("utf-8"), "UTF-16"
+            content, encoding = content.decode(wide).encode("utf-8"), "UTF-16"
         except UnicodeDecodeError as problem:
             hint = f"save it as {expected_format} in UTF-8"
             raise error_class(str(path), f"is not valid UTF-16 ({problem.reason})", hint) from problem
@@ -112,10 +114,8 @@ def require_utf8_text(content: bytes, where: str, error_class: type[InputError],
 def _refuse_binary(content: bytes, where: str, error_class: type[InputError], expected_format: str) -> None:
     """Raises ``error_class`` where the bytes, or the first of them, show that a file is not text."""
     hint = f"save it as {expected_format} in UTF-8"
-    if content.startswith(b"PK\x03\x04"):
-        raise error_class(where, "is a zip archive or a spreadsheet, not text", hint)
-    if content.startswith(b"\x1f\x8b"):
-        raise error_class(where, "is compressed by gzip, not text", "decompress it first")
+    if foreign := foreign_format(content[:HEAD_SIZE], expected_format):
+        raise error_class(where, *foreign)
     if content.startswith(_UTF_16_MARKS):
         raise error_class(where, "is UTF-16, not UTF-8", hint)
     null_index = content.find(b"\0")

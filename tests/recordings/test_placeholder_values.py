@@ -99,3 +99,15 @@ def test_a_platform_at_rest_whose_quaternion_changes_its_sign_is_measured() -> N
     sign = np.where((time > 2.0) & (time < 3.0), -1.0, 1.0)
     recorded = {"qw": sign * np.cos(half), "qx": sign * np.sin(half), "qy": 0.0 * time, "qz": 0.0 * time}
     assert without_placeholders(columns() | recorded)[1] == ()
+
+
+@pytest.mark.parametrize(("name", "value"), [("tension_1", 0.0), ("tension_1", -1.0), ("z", -1.0), ("z", 0.0)])
+def test_a_value_that_one_sensor_drops_to_again_and_again_is_emptied(name: str, value: float) -> None:
+    dropped = np.isin(np.arange(1000), (120, 121, 480, 800))
+    changed, (note,) = without_placeholders(columns() | {name: np.where(dropped, value, columns()[name])})
+    assert np.array_equal(np.isnan(changed[name]), dropped) and note.startswith(f"{name}: 4 samples at {value:.6g} are")
+
+
+def test_one_sample_alone_is_left_to_the_outliers() -> None:
+    recorded = columns() | {"z": np.where(np.arange(1000) == 480, -1.0, columns()["z"])}
+    assert without_placeholders(recorded)[1] == ()

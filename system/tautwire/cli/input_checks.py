@@ -15,6 +15,7 @@ from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.column_map import unit_errors
 from ..recordings.mdf_file import is_mdf
 from ..recordings.mistaken_orientation import orientation_notes
+from ..recordings.mistaken_robot import robot_file_mistakes
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.recording_notes import recording_notes
 from ..recordings.shared_samples import require_unseen
@@ -110,6 +111,10 @@ def check_files(
     if recording is not None and not problems:
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
+        if not recording_problems:
+            text = robot_file_text(robot_file)
+            mistakes = robot_file_mistakes(robot.as_modelled(), recording, str(robot_file))
+            problems += [_robot_file_problem(robot_file, text, error) for error in mistakes]
     return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
 
 

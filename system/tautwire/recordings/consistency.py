@@ -9,13 +9,22 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .alternative_readings import WindingReading, mistakes_text
-from .geometry_reading import GeometryReading, recorded_poses
-from .mistaken_motion import MAX_MISFIT, MIN_IMPROVEMENT, MotionCheck, check_motion
+from .alternative_readings import WindingReading
+from .anchor_scale import AnchorScale, anchor_scale
+from .consistency_errors import (
+    anchor_error,
+    motion_error,
+    odd_winch_error,
+    point_error,
+    tension_error,
+    unexplained_error,
+)
+from .geometry_reading import IDENTITY, GeometryReading, recorded_poses
+from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MAX_MISFIT, MIN_IMPROVEMENT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
 from .mistaken_points import PointMistake, point_mistake
-from .mistaken_tensions import TensionCheck, check_tensions
-from .motion_regression import centred, length_regression
+from .mistaken_tensions import check_tensions
+from .motion_regression import centred, dynamic_amplification, length_regression, moving_rows
 from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 from .standing_winches import all_winches_stand
@@ -34,6 +43,8 @@ CHECKED_DURATION = 60.0  # s
 MAX_SAMPLE_INTERVAL = 0.5  # s
 # Rms of what lengths in the columns of speeds miss, over that of the geometric ones.
 MAX_LENGTH_MISFIT = 0.1
+# What no winch that stands would miss: where ropes give, the platform still goes the way of its winches.
+MAX_UNEXPLAINED = 1.0
 # Their contributions to readings and points, and beside these to forces, are not computed here.
 EFFECTS_ON_POSES = frozenset(
     ("frame", "sensor_delay", "sensor_gain", "sensor_offset", "attachment", "centre_of_mass"),
@@ -75,21 +86,27 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     is_off = motion is not None and not _follows(motion)
     if is_off and (error := row_number_error(robot, recording) or length_column_error(robot, recording)):
         return (error,)
-    points = point_mistake(robot, recording) if is_off else None
-    if motion is not None and motion.readings and not _is_better(points, motion):
-        errors.append(_motion_error(robot, recording, motion))
+    odd = odd_winches(robot, recording) if is_off else ()
+    points = point_mistake(robot, recording) if is_off and not _are_of_factors(odd) else None
+    scale = None if _are_of_factors(odd) else anchor_scale(robot, recording)
+    if scale is not None and not _is_read_as_well(motion, scale):
+        return (anchor_error(recording, scale),)
+    if motion is not None and motion.readings and not _is_better(points, odd, motion):
+        errors.append(motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
     elif motion is not None and points is not None:
-        errors.append(_point_error(recording, motion, points))
-    elif is_off and (odd := odd_winches(robot, recording)):
-        errors += [_odd_winch_error(recording, each) for each in odd]
+        errors.append(point_error(recording, motion, points))
+    elif odd:
+        errors += [odd_winch_error(recording, each) for each in odd]
     elif error := travel or speed_error(recording) or start_orientation_error(robot, recording):
         return (error,)
+    elif motion is not None and _is_hopeless(robot, recording, motion):
+        errors.append(unexplained_error(recording, motion))
     if robot.formulas or declared & EFFECTS_ON_FORCES:
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
-        errors.append(_tension_error(recording, tensions))
+        errors.append(tension_error(recording, tensions))
     return tuple(errors)
 
 
@@ -164,43 +181,33 @@ def speed_error(recording: Recording) -> RecordingError | None:
     return RecordingError(recording.path, problem, hint)
 
 
-def _motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> RecordingError:
-    shown = "poses" if robot.platform.is_rigid_body else "positions"
-    causes, remedies = mistakes_text([reading.mistakes for reading in motion.readings], recording)
-    problem = (
-        f"winch travel does not match the {shown}: it is off by {_percentage(motion.misfit)}, by "
-        f"{_percentage(motion.readings[0].misfit)} if {causes}"
+def _is_better(points: PointMistake | None, odd: Sequence[OddWinch], motion: MotionCheck) -> bool:
+    """Whether mistaken points, or factors of single winches beside a frame, explain more than other readings do."""
+    reading = motion.readings[0]
+    is_frame = reading.geometry.rotation != IDENTITY
+    return (is_frame and _are_of_factors(odd)) or (
+        points is not None and MIN_IMPROVEMENT * points.misfit < reading.misfit
     )
-    return RecordingError(recording.path, problem, remedies)
 
 
-def _is_better(points: PointMistake | None, motion: MotionCheck) -> bool:
-    """Whether mistaken points explain far more than the readings of the recording do."""
-    return points is not None and MIN_IMPROVEMENT * points.misfit < motion.readings[0].misfit
+def _is_hopeless(robot: Robot, recording: Recording, motion: MotionCheck) -> bool:
+    """Whether winch travel explains nothing of a motion slow enough to follow the winches.
+
+    Of positions that begin elsewhere :func:`require_matching_reeling` tells more.
+    """
+    rows = moving_rows(robot, recording)
+    is_slow = rows is not None and np.isfinite(dynamic_amplification(robot, recording, rows))
+    return is_slow and MAX_UNEXPLAINED < motion.misfit < np.inf and not _starts_far_away(robot, recording)
 
 
-def _point_error(recording: Recording, motion: MotionCheck, points: PointMistake) -> RecordingError:
-    off = f"it is off by {_percentage(motion.misfit)}, by {_percentage(points.misfit)} if {points.cause}"
-    return RecordingError(recording.path, f"winch travel does not match the poses: {off}", points.remedy)
+def _are_of_factors(odd: Sequence[OddWinch]) -> bool:
+    return bool(odd) and all(each.is_factor for each in odd)
 
 
-def _odd_winch_error(recording: Recording, odd: OddWinch) -> RecordingError:
-    off = f"it is off by {_percentage(odd.misfit)}, and {odd.cause}"
-    problem = f"winch travel of cable {odd.cable} does not match the positions: {off}"
-    return RecordingError(recording.path, problem, odd.remedy)
-
-
-def _tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:
-    causes, remedies = mistakes_text(tensions.mistakes, recording)
-    problem = (
-        f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
-        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
-    )
-    return RecordingError(recording.path, problem, remedies)
-
-
-def _percentage(share: float) -> str:
-    return f"{100.0 * share:,.0f} %" if abs(share) >= 0.1 else f"{100.0 * share:.2g} %"
+def _is_read_as_well(motion: MotionCheck | None, scale: AnchorScale) -> bool:
+    """Whether other readings of the columns leave hardly more than a scale of the anchors does."""
+    readings = motion.readings if motion is not None else ()
+    return bool(readings) and readings[0].misfit <= EQUAL_RATIO * scale.misfit_left + EQUAL_DIFFERENCE
 
 
 def describe_start(robot: Robot, start: Array) -> str:
@@ -259,6 +266,13 @@ def robot_size(robot: Robot) -> float:
     """The largest distance between two of the exit points and the start, in m."""
     points = np.array([*robot.anchors, robot.platform.start])
     return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=2)))
+
+
+def _starts_far_away(robot: Robot, recording: Recording) -> bool:
+    """Whether positions begin where :func:`require_matching_reeling` judges, and tells more."""
+    first = recording.position[np.isfinite(recording.position[:, robot.axes_in_plane]).all(axis=1)][:ROWS_AT_REST]
+    start = np.where(np.isfinite(first), first, robot.platform.start).mean(axis=0)
+    return _start_distance(robot, start) >= MIN_CHECKED_START_SHARE * robot_size(robot)
 
 
 def _start_distance(robot: Robot, start: Array) -> float:

@@ -30,7 +30,7 @@ MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
 MAX_MOVED = 2.0  # of an exit point's distance from the start
 DRUM_SCALES = (0.7, 1.4)
 # Of a unit that is written otherwise, and of drums; what is farther off is an angle or a count.
-MAX_UNIT_ERROR, WINCH_RATIOS = 0.03, (0.25, 4.0)
+MAX_UNIT_ERROR, WINCH_RATIOS = 0.03, (0.55, 1.8)
 MIN_HELD_SAMPLES, MIN_TAUT_SHARE = 20, 0.2
 # Of samples, and of the rope's speed to the one that is recorded in them.
 MIN_CLIPPED_SHARE, MIN_CLIPPED_RATIO = 0.03, 1.2
@@ -39,12 +39,16 @@ SPEED_QUANTILE, MIN_SPIKE_RATIO = 0.99, 20.0
 
 @dataclass(frozen=True)
 class OddWinch:
-    """A cable, counted from 1, whose rope misses by ``misfit`` of its motion, the likely cause and what mends it."""
+    """A cable, counted from 1, whose rope misses by ``misfit`` of its motion, the likely cause and what mends it.
+
+    ``is_factor`` where the cause is a factor on its winch's column.
+    """
 
     cable: int
     misfit: float
     cause: str
     remedy: str
+    is_factor: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,9 @@ def odd_winches(robot: Robot, recording: Recording) -> tuple[OddWinch, ...]:
     others = [misfit for cable, misfit in enumerate(misfits) if cable not in odd]
     if not told and max(others, default=1.0) <= MAX_SHARE_LEFT:
         told = {cable: texts for cable in odd if (texts := _exit_point(robot, travel, cable))}
-    return tuple(OddWinch(cable + 1, misfits[cable], *texts) for cable, texts in told.items())[:MAX_TOLD]
+    return tuple(
+        OddWinch(cable + 1, misfits[cable], *texts, _is_factor(travel, cable)) for cable, texts in told.items()
+    )[:MAX_TOLD]
 
 
 def _longest_part(recording: Recording) -> Recording:
@@ -131,6 +137,11 @@ def _fault(travel: _Travel, cable: int) -> Texts | None:
     """The fault of a winch's column, as a clause, and what mends it; None where none is seen."""
     faults = (_other_unit, _other_factor, _copied, _held, _clipped, _wrapped, _unsigned, _jump)
     return next((texts for fault in faults if (texts := fault(travel, cable))), None)
+
+
+def _is_factor(travel: _Travel, cable: int) -> bool:
+    """Whether a factor on the winch's column explains what its rope misses."""
+    return _is_explained(travel.share_missed(cable, travel.ratio(cable)), travel.misfit(cable))
 
 
 def _other_unit(travel: _Travel, cable: int) -> Texts | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
@@ -15,7 +16,8 @@ Array = NDArray[np.float64]
 
 # A jump to a placeholder and back is so many times as large as a quantile of the steps.
 STEP_QUANTILE, MIN_JUMP_RATIO = 0.9, 10.0
-MIN_REPEATS = 2
+# Samples of a run, or so many runs of one value; what a sensor shows alone is short, or no zero of a tension.
+MIN_REPEATS, MAX_DROPOUT = 2, 5
 MAX_SHARE = 0.5
 
 
@@ -23,21 +25,22 @@ def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array]
     """Positions, quaternions and tensions (N,) without placeholders, as NaN, and a note on each.
 
     A placeholder is one value, repeated exactly in a run or in several, to which the coordinates together, the
-    quaternion, or a tension alone, jump and from which they jump back; that of a tension is outside what the cell shows
-    otherwise. A quaternion of zeros is no orientation, nor is one that stays the same wherever the position is lost.
+    quaternion, or a sensor alone, jump and from which they jump back; that of one sensor is outside what it shows
+    otherwise, and a coordinate's, or a tension's of 0, lasts for a few samples. A quaternion of zeros is no
+    orientation, nor is one that stays the same wherever the position is lost.
     """
     changed, notes = dict(columns), []
     is_lost = np.zeros(len(next(iter(columns.values()), ())), dtype=bool)
     axes = [name for name in AXES if name in columns]
-    for names in (axes, *([name] for name in columns if name.startswith("tension_"))):
-        rows = _placeholder_rows([columns[name] for name in names]) if names else np.array([], dtype=bool)
-        if not rows.any() or (names != axes and not _is_outside(columns[names[0]], rows)):
+    for names in (axes, *([name] for name in columns if name in axes or name.startswith("tension_"))):
+        rows = _placeholder_rows([changed[name] for name in names]) if names else np.array([], dtype=bool)
+        if not rows.any() or (names != axes and not _is_of_one_sensor(names[0], changed[names[0]], rows)):
             continue
         count = f"{rows.sum()} samples at {_text([columns[name][rows][0] for name in names])}"
         notes.append(f"{', '.join(names)}: {count} are where nothing was measured, and not used")
         is_lost = rows if names == axes else is_lost
         for name in names:
-            changed[name] = np.where(rows, np.nan, columns[name])
+            changed[name] = np.where(rows, np.nan, changed[name])
     if all(name in columns for name in QUATERNION_COLUMNS):
         quaternions = np.column_stack([columns[name] for name in QUATERNION_COLUMNS])
         rows = _lost_orientations(quaternions, is_lost)
@@ -75,11 +78,9 @@ def _placeholder_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
         return none
     limit = MIN_JUMP_RATIO * float(np.quantile(moving, STEP_QUANTILE))
     edges = np.concatenate([[0], np.flatnonzero(steps != 0.0) + 1, [len(values)]])
-    runs = [
-        (first, last)
-        for first, last in pairwise(edges)
-        if last - first >= MIN_REPEATS and _is_between_jumps(steps, first, last, limit)
-    ]
+    runs = [(first, last) for first, last in pairwise(edges) if _is_between_jumps(steps, first, last, limit)]
+    counts = Counter(tuple(values[first]) for first, _ in runs)
+    runs = [run for run in runs if run[1] - run[0] >= MIN_REPEATS or counts[tuple(values[run[0]])] >= MIN_REPEATS]
     if not runs:
         return none
     longest = values[max(runs, key=lambda run: run[1] - run[0])[0]]
@@ -94,8 +95,10 @@ def _is_between_jumps(steps: Array, first: int, last: int, limit: float) -> bool
     return bool(before and after and (first > 0 or last <= len(steps)))
 
 
-def _is_outside(column: Array, rows: NDArray[np.bool_]) -> bool:
-    """Whether a placeholder is outside the range of the other values, by more than this."""
+def _is_of_one_sensor(name: str, column: Array, rows: NDArray[np.bool_]) -> bool:
+    """Whether a placeholder is outside the range of the other values, by more than this, and no rest or slack rope."""
     others, value = column[~rows & np.isfinite(column)], float(column[rows][0])
     middle, extent = 0.5 * (others.max() + others.min()), float(np.ptp(others))
-    return abs(value - middle) > 1.5 * extent and value != 0.0
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], rows, [False])).astype(np.int8)))
+    is_short = bool(np.all(np.diff(edges)[::2] <= MAX_DROPOUT))
+    return abs(value - middle) > 1.5 * extent and (is_short or (value != 0.0 and name not in AXES))

@@ -27,6 +27,7 @@ from .csv_file import CsvTable, open_csv
 from .encoder_wrap import without_wraps
 from .mat_file import is_mat, open_mat
 from .mdf_file import is_mdf, open_mdf
+from .missing_codes import without_missing_codes
 from .parquet_file import is_parquet, open_parquet
 from .placeholder_values import without_placeholders
 from .quaternion_columns import are_valid, unit_quaternions
@@ -226,6 +227,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
     numbers = table.numbers()
     if numbers is None:
         raise _first_error(table)
+    numbers, code_notes = without_missing_codes(numbers, table.header)
     numbers, gap_notes = bridge_winch_gaps(numbers)
     numbers, wrap_notes = without_wraps(numbers, table.header)
     numbers, placeholder_notes = without_placeholders(numbers)
@@ -240,7 +242,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         orientation=_stacked_columns(numbers, QUATERNION_COLUMNS),
         unknown_columns=table.header.unknown_names,
         rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
-        read_as=(*dialect, *gap_notes, *wrap_notes, *placeholder_notes),
+        read_as=(*dialect, *code_notes, *gap_notes, *wrap_notes, *placeholder_notes),
         columns=table.header.recorded_columns,
         has_time_column=table.header.has_time_column and table.header.clock is None,
     )

@@ -14,6 +14,7 @@ MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
 # A rope thicker than 16 mm is there to carry more than this: else its area is a diameter.
 MIN_THICK_AREA, MIN_STRESS, MIN_STRAIN = 2e-4, 1e6, 2e-4  # m^2, Pa
 MAX_COORDINATE = 2000.0  # m
+MAX_DRUM_RADIUS = 5.0  # m
 MAX_UNCERTAINTY_RATIO = 0.1  # of a point, by its distance to the farthest exit point
 MAX_GRAVITY, STANDARD_GRAVITY = 30.0, 9.80665  # m/s^2
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
@@ -36,6 +37,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     for number, cable in enumerate(robot.cables, 1):
         errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
     errors += [*_platform_errors(robot, file), *_uncertainty_errors(robot, file), *_gravity_errors(robot, file)]
+    errors += _drum_errors(robot, file)
     yield from errors
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
         problem = f"is {max(map(abs, robot.platform.start)):g} m from the origin, no robot is larger than 2 km"
@@ -98,6 +100,15 @@ def _gravity_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     elif robot.gravity == 1.0:
         hint = f"write it in m/s^2, if this is in g as {STANDARD_GRAVITY:g}; on the Moon it is 1.62"
         yield _error(file, ("gravity",), "is 1 m/s^2, as of no planet or moon that has robots", hint)
+
+
+def _drum_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Error for a drum larger than any winch has."""
+    radius = robot.winch.drum_radius if robot.winch else 0.0
+    if radius > MAX_DRUM_RADIUS:
+        hint = f"write it in m, if this is in mm as {1e-3 * radius:g}"
+        problem = f"is {radius:g} m, drums have at most {MAX_DRUM_RADIUS:g}"
+        yield _error(file, ("winch", "drum_radius"), problem, hint)
 
 
 def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:

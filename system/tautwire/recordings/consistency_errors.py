@@ -1,0 +1,74 @@
+"""Errors of a recording that does not fit its robot: what shows it, the likely cause, and what mends it."""
+
+from __future__ import annotations
+
+from ..errors import RecordingError
+from ..robot.schema import Robot
+from .alternative_readings import mistakes_text
+from .anchor_scale import AnchorScale
+from .mistaken_motion import MotionCheck
+from .mistaken_points import PointMistake
+from .mistaken_tensions import TensionCheck
+from .odd_winches import OddWinch
+from .recording import Recording
+
+
+def motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> RecordingError:
+    """The error of readings of the columns that explain winch travel better."""
+    shown = "poses" if robot.platform.is_rigid_body else "positions"
+    causes, remedies = mistakes_text([reading.mistakes for reading in motion.readings], recording)
+    problem = (
+        f"winch travel does not match the {shown}: it is off by {_percentage(motion.misfit)}, by "
+        f"{_percentage(motion.readings[0].misfit)} if {causes}"
+    )
+    return RecordingError(recording.path, problem, remedies)
+
+
+def point_error(recording: Recording, motion: MotionCheck, points: PointMistake) -> RecordingError:
+    """The error of points of a rigid platform that are elsewhere."""
+    off = f"it is off by {_percentage(motion.misfit)}, by {_percentage(points.misfit)} if {points.cause}"
+    return RecordingError(recording.path, f"winch travel does not match the poses: {off}", points.remedy)
+
+
+def odd_winch_error(recording: Recording, odd: OddWinch) -> RecordingError:
+    """The error of one winch's travel."""
+    off = f"it is off by {_percentage(odd.misfit)}, and {odd.cause}"
+    problem = f"winch travel of cable {odd.cable} does not match the positions: {off}"
+    return RecordingError(recording.path, problem, odd.remedy)
+
+
+def tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:
+    """The error of load cells that are read otherwise."""
+    causes, remedies = mistakes_text(tensions.mistakes, recording)
+    problem = (
+        f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
+        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
+    )
+    return RecordingError(recording.path, problem, remedies)
+
+
+def anchor_error(recording: Recording, scale: AnchorScale) -> RecordingError:
+    """The error of exit points that are all too far or too near."""
+    problem = (
+        f"winch travel does not match the positions: it is off by {_percentage(scale.misfit)}, by "
+        f"{_percentage(scale.misfit_left)} if all anchors in the robot file are {scale.factor:.3g} times the true ones"
+    )
+    hint = f"write the anchors as surveyed, in m; multiplied by {1.0 / scale.factor:.3g} they fit"
+    return RecordingError(recording.path, problem, hint)
+
+
+def unexplained_error(recording: Recording, motion: MotionCheck) -> RecordingError:
+    """The error of winch travel that explains nothing of the positions, as it is read or in another way."""
+    problem = (
+        f"winch travel does not match the positions: it is off by {_percentage(motion.misfit)} of the ropes' motion, "
+        "more than winches that stand would be, and no unit, sign, order, frame or clock that was tried explains it"
+    )
+    hint = (
+        "compare one column after the other with the robot: are winches, positions and robot file of one run and one "
+        "robot, and is more than one of units, signs and anchors wrong?"
+    )
+    return RecordingError(recording.path, problem, hint)
+
+
+def _percentage(share: float) -> str:
+    return f"{100.0 * share:,.0f} %" if abs(share) >= 0.1 else f"{100.0 * share:.2g} %"
