@@ -72,7 +72,9 @@ def read_encoded_text(
             content.decode("utf-8")
         except UnicodeDecodeError:
             content, encoding = content.decode("latin-1").encode("utf-8"), "Latin-1"
-    return content.removeprefix(codecs.BOM_UTF8), encoding
+    while content.startswith(codecs.BOM_UTF8):
+        content = content.removeprefix(codecs.BOM_UTF8)
+    return content, encoding
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from tests.support.laboratory import (
     above,
     as_lengths,
     empty_speeds,
+    labview,
     lost_positions,
     of_one_cable,
     reordered,
@@ -92,6 +94,13 @@ READ: dict[str, Writer] = {
     "German dates over midnight": with_clock("points"),
     "American dates over midnight": with_clock("slashes"),
     "minutes of a spreadsheet over the hour": with_clock("minutes"),
+    "milliseconds behind a colon": with_clock("colon"),
+    "dates of MATLAB": with_clock("matlab"),
+    "dates with slashes, the year first": with_clock("year first"),
+    "German dates of a short year": with_clock("short year"),
+    "UTF-16 without its mark": lambda frame: text_of(frame).encode("utf-16-le"),
+    "two byte order marks": lambda frame: 2 * b"\xef\xbb\xbf" + text_of(frame).encode(),
+    "a file of LabVIEW, whose comments have no cell": labview,
 }
 
 REFUSED: dict[str, tuple[Writer, str]] = {
@@ -286,6 +295,42 @@ REFUSED: dict[str, tuple[Writer, str]] = {
         "winch_speed_1 is no speed of a rope in m/s: 1 of it is 0.0105 m/s, ",
     ),
     "one speed in half, of the other sign": (scaled(SPEEDS[:1], -2.0), "and winch_speed_1 has the other sign"),
+    "an old spreadsheet": (lambda frame: b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(500), "an old spreadsheet (.xls)"),
+    "an array of NumPy": (lambda frame: b"\x93NUMPY" + bytes(500), "load it with numpy.load"),
+    "a TDMS file": (lambda frame: b"TDSm" + bytes(500), "a TDMS file of LabVIEW"),
+    "HDF5 that is no MATLAB file": (lambda frame: b"\x89HDF\r\n\x1a\n" + bytes(500), "is HDF5"),
+    "the time of LabVIEW": (
+        lambda f: labview(f.rename(columns={"time": "X_Value"})),
+        'write into [recording.columns] time = { name = "X_Value" }',
+    ),
+    "a column of each line": (lambda f: f[:99].T.to_csv(header=False), "is transposed: lines begin with time, winch"),
+    "a name in each cell": (
+        with_lines(
+            lambda lines: [
+                "\t".join(f"{name}:{cell}" for name, cell in zip(lines[0].split(","), line.split(","), strict=True))
+                for line in lines[1:-1]
+            ]
+        ),
+        "has a name in each cell, as in 'time:0.0'",
+    ),
+    "a serial monitor's log": (
+        with_lines(lambda lines: [f"10:00:{i % 60:02d}.123 -> {line}" for i, line in enumerate(lines[1:-1])]),
+        "begins with a time and an arrow",
+    ),
+    "a counter of 16 bits for times": (
+        lambda f: text_of(f.assign(time=[(65_000 + round(1e3 * t)) % 2**16 for t in f.time])),
+        "as a counter of 16 bits does where it begins anew (and 130 more like it, last in line 186); add 65536",
+    ),
+    "names of ROS behind a mark": (
+        lambda f: text_of(f.set_axis(["%time", *(f"field.v{k}.data" for k in range(len(f.columns) - 1))], axis=1)),
+        "line 1: has none of the columns winch_speed_1 ... winch_speed_3, it has 'field.v0.data",
+    ),
+    "accelerations for speeds": (
+        lambda f: text_of(f.assign(**{name: np.gradient(f[name], f.time) for name in SPEEDS})),
+        "more than winches that stand would be",
+    ),
+    "one speed in half": (scaled(SPEEDS[1:2], 0.5), "gears, drums or intervals of time 2 times those"),
+    "one speed twice as large": (scaled(SPEEDS[1:2], 2.0), "gears, drums or intervals of time 0.5 times those"),
     "another robot": (
         lambda frame: text_of(pd.read_csv(EXAMPLES / "caroca" / "fit.csv", nrows=ROWS)),
         "does not match the positions",
@@ -301,6 +346,15 @@ ROBOTS: dict[str, tuple[str, str, str]] = {
     "gravity in g": ("gravity = 9.81", "gravity = 1", "if this is in g as 9.80665"),
     "mass in lb": ("mass = 300.0", "mass = 661.4", "platform.mass is in lb"),
     "anchors in mm": ("50.0, 50.0]", "50000.0, 50000.0]", "in mm multiply by 0.001"),
+    "stiffer ropes": ("modulus = 1.022e11", "modulus = 1.022e12", "write it in Pa, 1.02e+11 fits"),
+    "softer ropes": ("modulus = 1.022e11", "modulus = 1.022e10", "write it in Pa, 1.02e+11 fits"),
+    "a noise in mm": ("position_noise = 3e-4", "position_noise = 0.3", "if this is in mm as 0.0003"),
+    "a noise in kN": ("tension_noise = 2.0", "tension_noise = 0.002", "if this is in kN as 2"),
+    "a drum in mm": (
+        "[sensors]",
+        "[winch]\ndrum_radius = 50\ngear = 10\nbandwidth = 20\n[sensors]",
+        "if this is in mm as 0.05",
+    ),
 }
 
 
@@ -363,6 +417,29 @@ def test_the_motion_of_winches_in_a_gap_is_not_held_against_positions(tmp_path: 
     checked = check_files(laboratory.robot(ROBOT), laboratory.recording(text_of(frame)))
     assert checked.problems == () and any("the winch motion in its gaps" in note for note in checked.notes)
     assert not any("winch travel is off the recorded positions" in note for note in checked.notes)
+
+
+@pytest.mark.parametrize("column", ["z", "tension_2", "winch_speed_3"])
+def test_a_code_of_a_missing_number_is_left_out_and_told(column: str, tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    coded = frame.assign(**{column: frame[column].where(frame.index % 300 != 200, -9999.0)})
+    checked = check_files(laboratory.robot(ROBOT), laboratory.recording(text_of(coded)))
+    assert checked.problems == ()
+    assert any(f"{column}: 2 samples at -9999, as programs write" in note for note in checked.notes)
+    assert not any("outliers" in note for note in checked.notes)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_anchors_of_another_scale_are_refused_with_it(factor: float, tmp_path: Path) -> None:
+    laboratory = Laboratory(tmp_path)
+    numbers = {"50.0": f"{50.0 * factor}", "86.6": f"{86.6 * factor}"}
+    lines = [
+        re.sub(r"50\.0|86\.6", lambda match: numbers[match.group()], line) if line.startswith("anchor") else line
+        for line in ROBOT.splitlines()
+    ]
+    checked = check_files(laboratory.robot("\n".join(lines)), laboratory.recording(text_of(standard())))
+    (problem,) = map(str, checked.problems)
+    assert f"if all anchors in the robot file are {factor:.3g} times the true ones" in problem.replace("0.501", "0.5")
 
 
 @pytest.mark.parametrize("file", ["names in capitals, with a unit", "a unit at the end of a name"])

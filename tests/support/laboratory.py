@@ -68,6 +68,10 @@ def with_clock(form: str) -> Writer:
         "points": lambda t: f"{begin + t:%d.%m.%Y %H:%M:%S.%f}",
         "slashes": lambda t: f"{begin + t:%m/%d/%Y %I:%M:%S.%f %p}",
         "minutes": lambda t: f"{begin + t:%M:%S.%f}",
+        "colon": lambda t: f"{begin + t:%H:%M:%S}:{(begin + t).microsecond // 1000:03d}",
+        "matlab": lambda t: f"{begin + t:%d-%b-%Y %H:%M:%S.%f}",
+        "year first": lambda t: f"{begin + t:%Y/%m/%d %H:%M:%S.%f}",
+        "short year": lambda t: f"{begin + t:%d.%m.%y %H:%M:%S.%f}",
     }
 
     def write(frame: Frame) -> str:
@@ -75,6 +79,15 @@ def with_clock(form: str) -> Writer:
         return text_of(frame.assign(time=shown))
 
     return write
+
+
+def labview(frame: Frame) -> str:
+    """A file of LabVIEW (.lvm): two headers, and a last column of comments for which lines have no cell."""
+    ends = "***End_of_Header***"
+    above = ["LabVIEW Measurement\t", "Separator\tTab", "X_Columns\tOne", "Date\t2026/05/04", ends, "\t"]
+    above += ["Channels\t9", "Samples" + "\t800" * 9, "Delta_X" + "\t0.01" * 9, ends + "\t" * 10]
+    names, *samples = text_of(frame, "\t").split("\n")
+    return "\n".join([*above, f"{names}\tComment", *samples])
 
 
 def turned(frame: Frame) -> str:

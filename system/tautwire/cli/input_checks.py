@@ -110,10 +110,10 @@ def check_files(
         notes.extend(_estimated_factors(columns_file or robot_file))
     if recording is not None and not problems:
         progress("checking both together", 0.0)
-        _check_together(robot, recording, recording_problems, notes)
-        if not recording_problems:
+        cleaned = _check_together(robot, recording, recording_problems, notes)
+        if cleaned is not None:
             text = robot_file_text(robot_file)
-            mistakes = robot_file_mistakes(robot.as_modelled(), recording, str(robot_file))
+            mistakes = robot_file_mistakes(robot.as_modelled(), cleaned, str(robot_file))
             problems += [_robot_file_problem(robot_file, text, error) for error in mistakes]
     return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
 
@@ -253,19 +253,22 @@ def _grouped_problem(path: Path, group: _AlikeErrors) -> Problem:
     return Problem(str(path), first.line, first.where, problem, first.hint)
 
 
-def _check_together(robot: Robot, recording: Recording, problems: list[Problem], notes: list[str]) -> None:
+def _check_together(robot: Robot, recording: Recording, problems: list[Problem], notes: list[str]) -> Recording | None:
+    """The recording as a trace cleans it; None where it would not trace it."""
     path = Path(recording.path)
     notes.extend((*recording.notes, *orientation_notes(robot, recording)))
     if not (recording.has_position or recording.has_tension):
         notes.append(f"{path}: no tension and no position was measured; simulate accepts it, trace does not")
-        return
+        return None
     with _collecting_problems(problems, path):
-        prepared_notes = prepare_recordings(robot.as_modelled(), recording, None).notes
+        prepared = prepare_recordings(robot.as_modelled(), recording, None)
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
         notes.extend(start_pose(robot, noise, recording)[1])
         notes.extend(recording_notes(robot.as_modelled(), recording))
         notes.extend(_without_uncertainties(robot))
-        notes.extend(prepared_notes)
+        notes.extend(prepared.notes)
+        return prepared.fit
+    return None
 
 
 def _estimated_factors(path: Path) -> tuple[str, ...]:

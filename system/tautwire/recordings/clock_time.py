@@ -8,11 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import date
 
-_FRACTION = r"(?:[.,]([0-9]{1,9}))?"
+# Milliseconds may stand behind a colon.
+_FRACTION = r"(?:(?:[.,]|:(?=[0-9]{3}(?![0-9])))([0-9]{1,9}))?"
 _CLOCK = rf"([0-9]{{1,3}}):([0-5][0-9]):([0-5][0-9]){_FRACTION}"
-_ISO_DATE = r"([0-9]{4})-([0-9]{2})-([0-9]{2})[T ]"
-_GERMAN_DATE = r"([0-9]{1,2})\.([0-9]{1,2})\.([0-9]{4})[ T]"
-_DATE_WITH_SLASHES = r"[0-9]{1,2}/[0-9]{1,2}/[0-9]{4},? "
+_ISO_DATE = r"([0-9]{4})[-/.]([0-9]{2})[-/.]([0-9]{2})[T ]"
+_GERMAN_DATE = r"([0-9]{1,2})\.([0-9]{1,2})\.([0-9]{4}|[0-9]{2})[ T]"
+_DATE_WITH_SLASHES = r"(?:[0-9]{1,2}/[0-9]{1,2}/[0-9]{4}|[0-9]{1,2}[- ][A-Za-z]{3}[- ][0-9]{4}),? "
 _OFFSET = r"\s?(Z|[+-][0-9]{2}:?[0-5][0-9])"
 _HALF_DAY = r"(?:\s?([AaPp][Mm]))?"
 

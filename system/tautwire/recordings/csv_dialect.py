@@ -158,12 +158,22 @@ def _with_columns(body: bytes, source: _Source) -> tuple[bytes, str, tuple[str, 
     if separator == " ":
         return b"".join(b"\t".join(line.split()) + b"\n" for line in body.splitlines()), "\t", names
     named = names[:-1] if len(names) > 1 and not names[-1] else names
+    if len(source.first_cells) == len(names) - 1 > 1 and names[-1] not in source.header.known:
+        # LabVIEW's (.lvm) last column is a comment, and only lines that have one have its cell.
+        return body, separator, _without_comment_column(body, separator, names)
     if len(source.first_cells) != len(named) + 1 or source.first_cells[-1]:
         return body, separator, names
     lines = [line.rstrip(b" ") for line in body.splitlines()]
     if not all(line.endswith(separator.encode()) or not line for line in lines):
         return body, separator, names
     return b"\n".join(line[:-1] for line in lines), separator, named
+
+
+def _without_comment_column(body: bytes, separator: str, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The names without the last one where no line has a cell for it."""
+    lines = [line for line in body.splitlines() if line.strip()]
+    is_lacking = all(line.count(separator.encode()) == len(names) - 2 for line in lines)
+    return names[:-1] if is_lacking else names
 
 
 def _header_row(names: tuple[str, ...], separator: str) -> bytes:

@@ -20,8 +20,9 @@ from .csv_lines import (
     units_in_line,
     without_comment_mark,
 )
-from .csv_names import first_samples, with_unique_names
+from .csv_names import first_samples, names_above, with_unique_names
 from .recording_table import MAX_COLUMNS
+from .table_shape import require_upright
 from .units import Unit, find_unit
 
 # Of each separator that makes numbers of the first lines.
@@ -73,6 +74,8 @@ def read_header(content: bytes, lines: Sequence[bytes], columns: ColumnMap, file
     header = replace(header, names=names, has_text_above=any(map(_is_text, texts[: header.index])))
     if header.is_certain:
         _require_no_table_above(texts, header, file)
+    else:
+        require_upright(texts, known, file)
     units_index, data_index = _units_and_data(texts, header.index + height, header)
     _require_no_other_units(texts, range(header.index + height, data_index), units_index, header, file)
     first_row = texts[data_index] if data_index < len(texts) else ""
@@ -122,7 +125,13 @@ def _find_header(lines: Sequence[str], known: Mapping[str, str], file: str) -> C
         raise RecordingError(f"{file}: line {comments[0].index + 1}", problem, "keep one of the two")
     if not comments + guesses:
         raise RecordingError(file, f"has {len(lines)} blank lines and no header", "begin with the names of the columns")
-    return comments[0] if comments else max(guesses, key=lambda header: (not header.is_comment, header.known_count))
+    if comments:
+        return comments[0]
+    above = [names.index for sample in first_samples(lines)[:1] if (names := names_above(lines, sample, known))]
+    # As ROS writes it, names above samples may stand behind the mark of a comment.
+    return max(
+        guesses, key=lambda each: (not each.is_comment or each.index in above, each.known_count, each.index in above)
+    )
 
 
 def _as_header(index: int, line: str, known: Mapping[str, str], sampled: Mapping[str, int]) -> CsvHeader:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, UnknownColumnsError, format_value, raise_error
 from ..name_suggestions import closest_name, join_names
+from ..robot.recorded_columns import column_line
 from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .clock_time import ClockFormat
 from .near_names import columns_of_absent_kinds, near_name_errors
@@ -27,6 +28,10 @@ MAX_SAMPLES = 20_000_000
 
 ErrorSink = Callable[[RecordingError], None]
 
+# As LabVIEW and others call it; near names are suggested anyway.
+_NAMES_OF_TIME = frozenset(
+    {"x_value", "t", "timestamp", "zeit", "temps", "tiempo", "seconds", "elapsed", "rosbagtimestamp"}
+)
 _CABLE_COLUMN = re.compile(r"(?:winch_speed|rope_length|tension)_(0|[1-9][0-9]{0,5})")
 
 
@@ -138,6 +143,10 @@ def _missing_column_errors(
         renamed = "" if similar is None else f"rename {format_value(similar)}, "
         error_class = RecordingError if cable_count else UnknownColumnsError
         hint = f"add it, {renamed}or declare its name in [{table}"
+        times = [name for name in unknown_names if name.lower() in _NAMES_OF_TIME]
+        if each == "time" and times:
+            line_of_time = column_line(RecordedColumn("time", times[0]))
+            hint = f"write into [{table.partition(']')[0]}] {line_of_time}, or rename {format_value(times[0])}"
         yield error_class(where, f"the column {each} is missing", hint, line)
     lacking = missing_quaternion_columns(names)
     if lacking:
@@ -185,6 +194,8 @@ _NOT_A_NUMBER = ("nan", "NaN", "NAN", "-nan", "-NaN", "-nan(ind)", "1.#QNAN", "-
 MISSING_CELLS = ("", *_NOT_A_NUMBER, "NA", "N/A", "n/a", "#N/A", "<NA>", "NULL", "null", "None", "-", "--")
 # A time beyond this many seconds is an epoch in a smaller unit; in s, epochs of today are 1.8e9.
 _MAX_EPOCH = 1e10
+# Counters of times, and the largest step of one that begins anew, in its period.
+_COUNTER_BITS, _MAX_COUNTER_STEP = (16, 32), 0.02
 _EPOCH_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
@@ -218,7 +229,7 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
                 elif name in QUATERNION_COLUMNS:
                     quaternion[name] = value
         if time <= previous_time:
-            errors.append(CellError(_time_error(row, time, previous_time)))
+            errors.append(CellError(_time_error(row, header, time, previous_time)))
         problem_and_hint = quaternion_problem(quaternion) if len(quaternion) == len(QUATERNION_COLUMNS) else None
         if problem_and_hint:
             errors.append(CellError(RecordingError(row.where, *problem_and_hint, row.number)))
@@ -229,12 +240,17 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
         yield [CellError(RecordingError(file, f"has {samples}, must have at least 2", "record for longer"))]
 
 
-def _time_error(row: Row, time: float, previous_time: float) -> RecordingError:
-    """The error of a time that does not rise: it repeats, goes back, or begins anew."""
+def _time_error(row: Row, header: Header, time: float, previous_time: float) -> RecordingError:
+    """The error of a time that does not rise: it repeats, goes back, or begins anew, also as a counter does."""
     problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
     hint = "sort the samples; where the clock was set or a second run begins, cut the recording there"
     if time == previous_time:
         hint = "remove duplicates; of times that are rounded write more digits"
+    for bits in _COUNTER_BITS:
+        period = header.to_si("time", 2.0**bits) - header.to_si("time", 0.0)
+        if 1.0 - _MAX_COUNTER_STEP <= (previous_time - time) / period <= 1.0:
+            problem += f", as a counter of {bits} bits does where it begins anew"
+            hint = f"add {2**bits} to all times from this line on, and as much more wherever it begins anew again"
     return _cell_error(row, "time", problem, hint)
 
 

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import RecordingError
 from .recording import Recording
+from .shared_noise import noise_correlation
 from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
@@ -15,6 +16,7 @@ Array = NDArray[np.float64]
 # Digits that a file leaves out change a sample by less than its noise.
 TOLERANCE_IN_NOISE = 0.1
 RELATIVE_TOLERANCE = 1e-6
+MAX_NOISE_CORRELATION = 0.7
 MAX_SHARED_SAMPLES = 0.1  # of those that validate
 
 
@@ -26,6 +28,10 @@ def require_unseen(fit: Recording, check: Recording) -> None:
         problem = f"has {count} of its {check.sample_count} samples in common with FIT, which they cannot validate"
         hint = "give a recording of another motion, or none: then the second half of FIT validates"
         raise RecordingError(check.path, problem, hint)
+    correlation = noise_correlation(check, fit)
+    if correlation > MAX_NOISE_CORRELATION:
+        problem = f"has the noise of FIT (correlation {correlation:.2f}), as FIT has where it is resampled or shifted"
+        raise RecordingError(check.path, problem, "give a recording of another run, or none")
 
 
 def shared_sample_count(recording: Recording, other: Recording) -> int:

@@ -1,0 +1,54 @@
+"""A recording that was resampled, delayed or shifted from another is told by its noise; another run is not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tautwire.errors import RecordingError
+from tautwire.recordings.recording import Recording, read_recording, recording_from_frame
+from tautwire.recordings.shared_noise import noise_correlation
+from tautwire.recordings.shared_samples import require_unseen
+from tests.support.robots import EXAMPLES
+
+CABLES = {"three": 3, "eight": 8, "cogiro": 8}
+
+
+def shipped(name: str, recording: str) -> Recording:
+    return read_recording(EXAMPLES / name / f"{recording}.csv", CABLES[name])
+
+
+def resampled(recording: Recording, stride: float, delay: float, shift: float) -> Recording:
+    """A recording at every so many of its intervals, from so many on, with its positions shifted (m)."""
+    frame, interval = recording.frame(), float(np.median(np.diff(recording.time)))
+    times = np.arange(recording.time[0] + delay * interval, recording.time[-1], stride * interval)
+    columns = {name: np.interp(times, recording.time, frame[name]) for name in frame}
+    columns |= {"time": times - times[0]} | {axis: columns[axis] + shift for axis in "xyz"}
+    return recording_from_frame(pd.DataFrame(columns), recording.cable_count)
+
+
+@pytest.mark.parametrize(
+    ("stride", "delay", "shift"),
+    [(1.0, 0.5, 0.0), (0.8, 0.3, 0.0), (1.25, 0.0, 0.0), (1.0, 0.0, 0.05), (3.0, 0.1, 0.0)],
+)
+@pytest.mark.parametrize("name", CABLES)
+def test_a_copy_at_other_times_or_places_is_refused(name: str, stride: float, delay: float, shift: float) -> None:
+    fit = shipped(name, "fit")
+    with pytest.raises(RecordingError, match=r"the noise of FIT|samples in common"):
+        require_unseen(fit, resampled(fit, stride, delay, shift))
+
+
+@pytest.mark.parametrize("name", CABLES)
+def test_another_run_has_noise_of_its_own(name: str) -> None:
+    assert noise_correlation(shipped(name, "check"), shipped(name, "fit")) < 0.2
+
+
+def test_the_same_motion_once_more_has_noise_of_its_own() -> None:
+    fit, generator = shipped("three", "fit"), np.random.default_rng(4)
+    frame = fit.frame()
+    deviations = {"x": 3e-4, "y": 3e-4, "z": 3e-4} | {f"tension_{cable}": 2.0 for cable in (1, 2, 3)}
+    again = frame.rolling(9, center=True, min_periods=1).mean().assign(time=frame["time"])
+    for name, deviation in deviations.items():
+        again[name] += deviation * generator.normal(size=len(frame))
+    require_unseen(fit, recording_from_frame(again, 3))
