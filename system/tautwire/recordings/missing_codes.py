@@ -16,8 +16,9 @@ MISSING_CODES = (
     *(sign * code for code in (999.0, 9999.0, 99999.0, 999999.0, 999.9, 9999.9, 999.25, 1e6, 1e9) for sign in (-1, 1)),
     *(-32768.0, 32767.0, 65535.0, -2147483648.0, 2147483647.0, 4294967295.0),
 )
-# A code is so many times the extent of the other numbers from these, and a share of itself; at most half are codes.
-MIN_DISTANCE, MIN_OWN_SHARE, MAX_SHARE = 3.0, 0.5, 0.5
+# A code is so many times the extent of the other numbers from these, and a share of itself; at most half
+# are codes, beside some samples.
+MIN_DISTANCE, MIN_OWN_SHARE, MAX_SHARE, MIN_SAMPLES = 3.0, 0.5, 0.5, 20
 
 
 def without_missing_codes(columns: Mapping[str, Array], header: Header) -> tuple[dict[str, Array], tuple[str, ...]]:
@@ -43,7 +44,7 @@ def without_missing_codes(columns: Mapping[str, Array], header: Header) -> tuple
 
 def _is_apart(values: Array, is_code: NDArray[np.bool_]) -> bool:
     others = values[~is_code & np.isfinite(values)]
-    if not others.size or np.mean(is_code) > MAX_SHARE:
+    if others.size < MIN_SAMPLES or np.mean(is_code) > MAX_SHARE:
         return False
     extent = float(np.ptp(others))
     found = values[is_code]
