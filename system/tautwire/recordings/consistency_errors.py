@@ -48,12 +48,13 @@ def tension_error(recording: Recording, tensions: TensionCheck) -> RecordingErro
 
 
 def anchor_error(recording: Recording, scale: AnchorScale) -> RecordingError:
-    """The error of exit points that are all too far or too near."""
+    """The error of exit points or attachments that are all off by one factor."""
     problem = (
         f"winch travel does not match the positions: it is off by {_percentage(scale.misfit)}, by "
-        f"{_percentage(scale.misfit_left)} if all anchors in the robot file are {scale.factor:.3g} times the true ones"
+        f"{_percentage(scale.misfit_left)} if all {scale.key}s in the robot file are {scale.factor:.3g} times the true "
+        "ones"
     )
-    hint = f"write the anchors as surveyed, in m; multiplied by {1.0 / scale.factor:.3g} they fit"
+    hint = f"write the {scale.key}s as surveyed, in m; multiplied by {1.0 / scale.factor:.3g} they fit"
     return RecordingError(recording.path, problem, hint)
 
 
