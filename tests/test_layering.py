@@ -13,6 +13,7 @@ FMU_SOURCES = SYSTEM.parent / "fmu_src"
 FILES = (
     "array_validation",
     "atomic_output",
+    "foreign_formats",
     "input_files",
     "json_document",
     "machine_code_cache",

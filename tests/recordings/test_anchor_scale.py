@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -14,11 +15,9 @@ from tests.support.robots import EXAMPLES
 
 
 def scaled(robot: Robot, key: str, factor: float) -> Robot:
-    cables = tuple(
-        replace(cable, **{key: tuple(factor * coordinate for coordinate in getattr(cable, key))})
-        for cable in robot.cables
-    )
-    return replace(robot, cables=cables)
+    points = [tuple(factor * coordinate for coordinate in getattr(cable, key)) for cable in robot.cables]
+    changes: list[dict[str, Any]] = [{key: point} for point in points]
+    return replace(robot, cables=tuple(replace(c, **change) for c, change in zip(robot.cables, changes, strict=True)))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from .recording import Recording
-from .white_noise_estimate import NORMAL_ABSOLUTE_MEDIAN
+from .white_noise_estimate import NORMAL_ABSOLUTE_MEDIAN, white_noise_deviation
 
 Array = NDArray[np.float64]
 
@@ -15,14 +15,15 @@ Array = NDArray[np.float64]
 # one those that lie between samples.
 GRIDS = (1, 4)
 SMOOTHING_INTERVALS, SMOOTHING_ORDER, MAX_SIGMAS = 9, 3, 3.0
-MIN_COMMON_INTERVALS, MAX_POINTS = 100, 2**18
+MAX_MOTION_RATIO = 2.0
+MIN_COMMON_INTERVALS, MIN_COMMON_SHARE, MAX_POINTS = 100, 0.6, 2**18
 
 
 def noise_correlation(recording: Recording, other: Recording) -> float:
     """The largest correlation of what is faster than the motion, at any shift in time, as the median over outputs.
 
     Outputs less their local polynomials (Savitzky and Golay, 1964), clipped at three deviations so that jolts do not
-    count. Noises of two recordings leave some 0.15, structured ones 0.4; a resampled copy leaves 0.75 or more.
+    count. Noises of two recordings leave 0.3 at most, a resampled copy 0.75 or more.
     """
     return max(_correlation(recording, other, points) for points in GRIDS)
 
@@ -30,12 +31,12 @@ def noise_correlation(recording: Recording, other: Recording) -> float:
 def _correlation(recording: Recording, other: Recording, points: int) -> float:
     interval = max(float(np.median(np.diff(each.time))) for each in (recording, other)) / points
     grids = [np.arange(each.time[0], each.time[-1], interval)[:MAX_POINTS] for each in (recording, other)]
-    least = points * MIN_COMMON_INTERVALS
+    least = max(points * MIN_COMMON_INTERVALS, int(MIN_COMMON_SHARE * min(map(len, grids))))
     if min(map(len, grids)) < least:
         return 0.0
     window = points * SMOOTHING_INTERVALS | 1
     length = 1 << int(np.ceil(np.log2(sum(map(len, grids)))))
-    overlap = _products(*(np.ones_like(grid) for grid in grids), length)
+    overlap = _products(np.ones_like(grids[0]), np.ones_like(grids[1]), length)
     by_output = []
     for columns in zip(*(_outputs(each).T for each in (recording, other)), strict=True):
         mine, others = (
@@ -43,7 +44,9 @@ def _correlation(recording: Recording, other: Recording, points: int) -> float:
             for each, column, grid in zip((recording, other), columns, grids, strict=True)
         )
         scale = float(np.sqrt(np.mean(mine**2) * np.mean(others**2)))
-        if scale > 0.0:
+        noise = max(white_noise_deviation(column[:, None]) for column in columns)
+        # Of a sensor that shows faster motion than the smoothing leaves out, two runs are alike.
+        if scale > 0.0 and max(np.std(mine), np.std(others)) <= MAX_MOTION_RATIO * noise:
             by_output.append(_products(mine, others, length) / (np.maximum(overlap, least) * scale))
     if not by_output:
         return 0.0
@@ -60,7 +63,7 @@ def _products(first: Array, second: Array, length: int) -> Array:
 
 
 def _noise(time: Array, column: Array, grid: Array, window: int) -> Array:
-    """What is faster than the motion on a grid, in its deviations; zeros of a column that is coarse or not measured."""
+    """What is faster than the motion on a grid, clipped; zeros of a column that is coarse or not measured."""
     is_measured = np.isfinite(column)
     if np.count_nonzero(is_measured) <= MIN_COMMON_INTERVALS:
         return np.zeros_like(grid)
@@ -69,4 +72,4 @@ def _noise(time: Array, column: Array, grid: Array, window: int) -> Array:
     deviation = float(np.median(np.abs(rest))) / NORMAL_ABSOLUTE_MEDIAN
     if not deviation > 0.0:
         return np.zeros_like(grid)
-    return np.asarray(np.clip(rest / deviation, -MAX_SIGMAS, MAX_SIGMAS))
+    return np.asarray(np.clip(rest, -MAX_SIGMAS * deviation, MAX_SIGMAS * deviation))
