@@ -13,7 +13,6 @@ FMU_SOURCES = SYSTEM.parent / "fmu_src"
 FILES = (
     "array_validation",
     "atomic_output",
-    "foreign_formats",
     "input_files",
     "json_document",
     "machine_code_cache",
@@ -37,7 +36,7 @@ ROOMS = (
     "paper",
     "cli",
 )
-LAYERS = (("errors",), FILES, ("validation",), *((room,) for room in ROOMS))
+LAYERS = (("errors", "foreign_formats"), FILES, ("validation",), *((room,) for room in ROOMS))
 LAYER_OF = {name: layer for layer, names in enumerate(LAYERS) for name in names}
 
 
