@@ -93,7 +93,10 @@ def _misfit(robot: Robot, poses: RecordedPoses, wound: Array, ramp: Array) -> tu
 
 
 def _scaled_robot(robot: Robot, key: str, factor: float) -> Robot:
-    cables = tuple(replace(cable, **{key: _scaled(getattr(cable, key), factor)}) for cable in robot.cables)
+    if key == "anchor":
+        cables = tuple(replace(cable, anchor=_scaled(cable.anchor, factor)) for cable in robot.cables)
+    else:
+        cables = tuple(replace(cable, attachment=_scaled(cable.attachment, factor)) for cable in robot.cables)
     return replace(robot, cables=cables)
 
 
