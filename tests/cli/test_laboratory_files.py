@@ -242,7 +242,6 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     ),
     "a page of HTML": (lambda f: f"<html>{f[:5].to_html()}</html>", "is HTML or XML, not a table in CSV"),
     "a list in JSON": (lambda f: str(f[:5].to_json(orient="records")), "is JSON, not a table in CSV"),
-    "samples in columns": (lambda f: f[:50].T.to_csv(header=False), "has none of the columns winch_speed_1"),
     "a last line that is cut": (lambda f: text_of(f)[:-30], "cells, the header has 10; complete the line or remove it"),
     "a log with room for more": (
         lambda f: text_of(f).encode() + bytes(500),

@@ -13,11 +13,16 @@ from tautwire.estimation import identification_stages
 from tautwire.estimation.explained_shares import ExplainedShares
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext, no_progress
-from tautwire.estimation.identification_stages import drop_least_evident_effects, select_beside_disturbance
+from tautwire.estimation.identification_stages import (
+    drop_least_evident_effects,
+    select_beside_disturbance,
+    select_with_other_interpolation,
+)
 from tautwire.estimation.identification_state import Identification
 from tautwire.estimation.parameter_fit import Fit, NoFitError
 from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.selection_result import SelectionResult
+from tautwire.estimation.time_limit import TimeLimit
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.robots import example
 
@@ -33,6 +38,7 @@ class ContextWithPolicy:
     robot: Any = ROBOT
     fitter: Any = None
     split: Any = None
+    time_limit: Any = None
 
 
 def with_effects(*names: str, **spreads: float) -> Identification:
@@ -126,3 +132,32 @@ def test_effects_that_nearly_cancel_are_no_answer_beside_a_disturbance(
         monkeypatch.setattr(identification_stages, stage, lambda state: state)
     answer = select_beside_disturbance(white)
     assert (answer is not white) == is_answer
+
+
+@pytest.mark.parametrize("is_cut_short", [False, True])
+def test_a_second_search_counts_only_when_it_is_complete(monkeypatch: pytest.MonkeyPatch, is_cut_short: bool) -> None:
+    first, second, limit = (
+        with_effects("modulus", modulus=0.1),
+        with_effects("payload", payload=0.1).selection,
+        TimeLimit(),
+    )
+    context = replace(cast("Any", first.context), fitter=SimpleNamespace(has_disturbance=True), time_limit=limit)
+    first = replace(first, context=context)
+
+    def select(state: Identification) -> Identification:
+        if is_cut_short:
+            limit.leave_untried("There was no time for effects.")
+        return replace(state, selection=second)
+
+    prepared = SimpleNamespace(fitter=context.fitter)
+    for name, stand_in in {
+        "split_with_other_interpolation": lambda split: "other data",
+        "with_other_interpolation": lambda *_: prepared,
+        "_is_far_likelier": lambda *_: True,
+        "start_side_runs": lambda state: state,
+        "select": select,
+    }.items():
+        monkeypatch.setattr(identification_stages, name, stand_in)
+    result = select_with_other_interpolation(first)
+    assert result is first if is_cut_short else result.selection is second
+    assert is_cut_short or (result.prepared, result.context.split) == (prepared, "other data")

@@ -91,6 +91,12 @@ def test_speeds_of_an_encoder_have_no_other_interpolation() -> None:
     assert split_with_other_interpolation(split_of(counted, counted)) is None
 
 
+def test_speeds_taken_from_an_encoder_stay_so() -> None:
+    recording = shaken(True, noise=None, duration=2.0)
+    taken = replace(split_of(recording, recording), has_speeds_between_samples=True)
+    assert split_with_other_interpolation(taken) is None
+
+
 def test_speeds_of_a_surveyed_robot_are_samples_of_a_smooth_motion() -> None:
     recordings = shaken(True, 1), shaken(True, 2)
     surveyed, *_ = prepare_data(SURVEYED, *recordings, WorkerPool(1))

@@ -48,11 +48,15 @@ class DataSet:
 
 @dataclass(frozen=True)
 class DataSplit:
-    """Estimation data that fits and validation data that judges; never the same samples."""
+    """Estimation data that fits and validation data that judges; never the same samples.
+
+    ``has_speeds_between_samples``: whether winch speeds were taken from an encoder's counts or lengths.
+    """
 
     estimation: DataSet
     validation: DataSet
     notes: tuple[str, ...]
+    has_speeds_between_samples: bool = False
 
     @property
     def roles(self) -> tuple[str, ...]:

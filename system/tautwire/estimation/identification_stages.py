@@ -75,8 +75,10 @@ def select_with_other_interpolation(state: Identification) -> Identification:
     if split is None or not _is_far_likelier(state, split):
         return state
     prepared = with_other_interpolation(state.prepared, state.context.robot, split)
-    context = replace(state.context, fitter=prepared.fitter, split=split)
-    return select(start_side_runs(replace(state, context=context, prepared=prepared)))
+    context, untried = replace(state.context, fitter=prepared.fitter, split=split), state.context.time_limit.untried
+    other = select(start_side_runs(replace(state, context=context, prepared=prepared)))
+    # A search that was cut short may have lost what the first one found.
+    return other if context.time_limit.untried == untried else state
 
 
 def _is_far_likelier(state: Identification, split: DataSplit) -> bool:

@@ -185,9 +185,9 @@ def _with_likely_interpolation(
     if smooth is None:
         return with_fitted_disturbance(fitter, robot, (), split.estimation), split
     fitter = with_fitted_disturbance(fitter, robot, (), smooth.estimation)
-    gain = fitter.log_likelihood(robot, (), split.estimation) - fitter.log_likelihood(robot, (), smooth.estimation)
-    measured = np.isfinite(split.estimation.recording.measured()[split.estimation.rows])
-    if gain <= policy.min_linear_gain * int(np.sum(measured)):
+    innovations, rows = fitter.innovations(robot, smooth.estimation), smooth.estimation.rows
+    gain = fitter.log_likelihood(robot, (), split.estimation) - innovations.log_likelihood(rows)
+    if gain <= policy.min_linear_gain * int(np.sum(innovations.observed[rows])):
         return fitter, smooth
     return with_fitted_disturbance(fitter, robot, (), split.estimation), split
 
@@ -198,7 +198,7 @@ def with_other_interpolation(prepared: PreparedData, robot: Robot, split: DataSp
     data_sets = (split.estimation, split.validation)[: len(prepared.data_sets)]
     recording = split.estimation.recording
     kind = "linear" if recording.winch_acceleration is None else "cubic"
-    note = f"{recording.path}: winch speeds are {kind} between samples, which is likelier under the effects found"
+    note = f"{recording.path}: winch speeds are {kind} between samples, which is far likelier"
     innovations = innovations_of(fitter, robot, split)
     return PreparedData(split, data_sets, fitter, innovations, (*prepared.notes, note))
 

@@ -88,8 +88,9 @@ class PreprocessingPolicy:
     # The same as a share of what squared innovations exceed white noise by, in nats: beside a disturbance next to
     # nothing, without one much where an effect is hidden. Chosen, not calibrated.
     min_speed_gain_to_misfit: float = 0.1
-    # Nats for each measured number from which winch speeds are linear between samples before any effect is known: hidden
-    # damping of 20 times the declared one made these 0.008 likelier, though cubic ones were true.
+    # Nats for each measured number from which winch speeds are linear between samples before effects are known. Hidden
+    # damping of 20 times the declared one made these 0.008 likelier, though cubic ones were true; under the effects
+    # found ``min_speed_gain`` decides.
     min_linear_gain: float = 0.02
     dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
     outliers: OutlierPolicy = field(default_factory=OutlierPolicy)

@@ -26,7 +26,7 @@ def split_with_other_interpolation(split: DataSplit) -> DataSplit | None:
     None where the speeds are an encoder's: see :func:`speed_versions` for these.
     """
     fit, check = split.estimation.recording, split.validation.recording
-    if may_be_central_differences(fit):
+    if split.has_speeds_between_samples or may_be_central_differences(fit):
         return None
     interpolated = with_spline_speeds if fit.winch_acceleration is None else with_linear_speeds
     other = interpolated(fit)
@@ -71,7 +71,8 @@ def speed_versions(
     size = float(np.max(np.std(estimation.recording.winch_speed - recorded.winch_speed, axis=0)))
     paths = recorded.path if is_shared else f"{recorded.path} and {check.path}"
     note = f"{paths}: winch speeds are {description} differ by {size:.2g} m/s (rms), were used"
-    corrected = (other, DataSplit(estimation, validation, split.notes), (note,))
+    data = DataSplit(estimation, validation, split.notes, has_speeds_between_samples=True)
+    corrected = (other, data, (note,))
     return [corrected] if gain >= decisive_gain else [as_recorded, corrected]
 
 

@@ -35,7 +35,7 @@ def fmi3_description(fmi2: Element) -> Element:
         {
             "name": INDEPENDENT_VARIABLE,
             "valueReference": str(len(variables)),
-            "description": "time of the last communication point",
+            "description": "simulation time: of the last communication point, or as set in model exchange",
             "causality": "independent",
             "variability": "continuous",
             "unit": "s",
