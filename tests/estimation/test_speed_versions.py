@@ -97,15 +97,7 @@ def test_speeds_taken_from_an_encoder_stay_so() -> None:
     assert split_with_other_interpolation(taken) is None
 
 
-def test_speeds_of_a_surveyed_robot_are_samples_of_a_smooth_motion() -> None:
-    recordings = shaken(True, 1), shaken(True, 2)
-    surveyed, *_ = prepare_data(SURVEYED, *recordings, WorkerPool(1))
-    assert all(data.recording.winch_acceleration is not None for data in surveyed.data_sets)
-    exact, *_ = prepare_data(THREE, *recordings, WorkerPool(1))
-    assert all(data.recording.winch_acceleration is None for data in exact.data_sets)
-
-
-def test_speeds_that_are_clearly_linear_stay_so() -> None:
+def test_speeds_are_cubic_where_that_is_far_likelier_beside_a_disturbance() -> None:
     for is_smooth in (False, True):
         recordings = (shaken(is_smooth, seed, noise=PRECISE) for seed in (1, 2))
         prepared, *_ = prepare_data(PRECISELY_MEASURED, *recordings, WorkerPool(1))
@@ -119,8 +111,8 @@ def test_interpolation_is_judged_again_under_the_effects_found(
     monkeypatch: pytest.MonkeyPatch, is_smooth: bool
 ) -> None:
     """It begins with the wrong one."""
-    threshold = -np.inf if is_smooth else np.inf
-    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_linear_gain=threshold)
+    threshold = np.inf if is_smooth else -np.inf
+    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_cubic_gain=threshold)
     monkeypatch.setattr(
         identification, "policy_within", lambda seconds: replace(DEFAULT_POLICY, preprocessing=wrong_first)
     )

@@ -176,20 +176,16 @@ def prepare_data(
 def _with_likely_interpolation(
     fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
 ) -> tuple[Fitter, DataSplit]:
-    """The disturbance fitted to FIT, with winch speeds cubic between samples unless linear ones are far likelier.
-
-    Speeds of a real robot are samples of a smooth motion. Without a disturbance they stay linear, as those of a
-    simulation are.
-    """
+    """The disturbance fitted to FIT, with winch speeds linear between samples unless cubic ones are far likelier."""
+    fitter = with_fitted_disturbance(fitter, robot, (), split.estimation)
     smooth = split_with_other_interpolation(split) if fitter.has_disturbance else None
     if smooth is None:
-        return with_fitted_disturbance(fitter, robot, (), split.estimation), split
-    fitter = with_fitted_disturbance(fitter, robot, (), smooth.estimation)
-    innovations, rows = fitter.innovations(robot, smooth.estimation), smooth.estimation.rows
-    gain = fitter.log_likelihood(robot, (), split.estimation) - innovations.log_likelihood(rows)
-    if gain <= policy.min_linear_gain * int(np.sum(innovations.observed[rows])):
-        return fitter, smooth
-    return with_fitted_disturbance(fitter, robot, (), split.estimation), split
+        return fitter, split
+    innovations, rows = fitter.innovations(robot, split.estimation), split.estimation.rows
+    gain = fitter.log_likelihood(robot, (), smooth.estimation) - innovations.log_likelihood(rows)
+    if gain <= policy.min_cubic_gain * int(np.sum(innovations.observed[rows])):
+        return fitter, split
+    return with_fitted_disturbance(fitter, robot, (), smooth.estimation), smooth
 
 
 def with_other_interpolation(prepared: PreparedData, robot: Robot, split: DataSplit) -> PreparedData:

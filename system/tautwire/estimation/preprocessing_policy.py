@@ -88,10 +88,10 @@ class PreprocessingPolicy:
     # The same as a share of what squared innovations exceed white noise by, in nats: beside a disturbance next to
     # nothing, without one much where an effect is hidden. Chosen, not calibrated.
     min_speed_gain_to_misfit: float = 0.1
-    # Nats for each measured number from which winch speeds are linear between samples before effects are known. Hidden
-    # damping of 20 times the declared one made these 0.008 likelier, though cubic ones were true; under the effects
-    # found ``min_speed_gain`` decides.
-    min_linear_gain: float = 0.02
+    # Nats for each measured number from which winch speeds are cubic between samples before effects are known. True
+    # linear ones were 0.001 less likely beside hidden friction, true cubic ones 0.008 beside hidden damping. Under the
+    # effects found ``min_speed_gain`` decides.
+    min_cubic_gain: float = 0.005
     dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
     outliers: OutlierPolicy = field(default_factory=OutlierPolicy)
     noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)
