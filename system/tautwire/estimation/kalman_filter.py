@@ -243,11 +243,13 @@ class _Interval:
     def speeds_in_part(self, index: SX | int, count: int) -> list[SX]:
         """Winch speeds at the begin, in the middle, and at the end of one of some equal parts."""
         begin_bend, end_bend = casadi.vertsplit(self.bends, self.speed.numel())
-        fractions = ((index + share) / count for share in (0.0, 0.5, 1.0))
-        return [
-            self.speed + f * (self.next_speed - self.speed) + f * (1.0 - f) * ((1.0 - f) * begin_bend - f * end_bend)
-            for f in fractions
-        ]
+
+        def bent(share: float) -> SX:
+            f = (index + share) / count
+            return f * (1.0 - f) * ((1.0 - f) * begin_bend - f * end_bend)
+
+        begin, end = (self.speed + (index + k) / count * (self.next_speed - self.speed) for k in (0, 1))
+        return [begin + bent(0.0), 0.5 * (begin + end) + bent(0.5), end + bent(1.0)]
 
 
 def _statics_at(model: SymbolicModel, theta: SX) -> tuple[SX, SX]:

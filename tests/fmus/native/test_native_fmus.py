@@ -64,7 +64,11 @@ def test_variables_are_those_of_the_python_fmus(complete_fmus: tuple[RobotFmus, 
     for python, native in zip(complete_fmus[0].paths, complete_fmus[1].paths, strict=True):
         one, other = (fmpy.read_model_description(str(path)) for path in (python, native))
         assert described_variables(one) == described_variables(other)
-        assert dependencies(one) == dependencies(other)
+        for (name, inputs), (native_name, of_native) in zip(dependencies(one), dependencies(other), strict=True):
+            assert name == native_name
+            # In model exchange a lagging sensor shows the present, too, in steps longer than its lag.
+            is_late = name == "tension" or name.startswith("measured_position")
+            assert set(inputs) < set(of_native) if is_late else inputs == of_native
         assert not other.coSimulation.needsExecutionTool
 
 
