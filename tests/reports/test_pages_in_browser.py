@@ -146,13 +146,13 @@ def test_a_mode_goes_round(browser: Browser, pages: dict[str, Path]) -> None:
 @pytest.mark.validate
 def test_views_turn_the_robot(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).see("figure.scene")
-    before = browser.pixels("#scene")
+    shown = [browser.pixels("#scene")]
     for view in ("top", "close"):
         browser.run("document.querySelector(`[data-view=${arguments[0]}]`).click()", view)
         after = browser.pixels("#scene")
-        assert float((after != before).any(axis=2).mean()) > 0.01, view
+        assert all(float((after != before).any(axis=2).mean()) > 0.01 for before in shown), view
         assert near(after, themes()["light"]["accent"]) > 20, view
-        before = after
+        shown.append(after)
 
 
 @pytest.mark.validate

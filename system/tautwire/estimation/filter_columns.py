@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
-from ..recordings.speed_interpolation import speed_bends
+from ..recordings.speed_interpolation import bent_by, speed_bends
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def _speeds_in_parts(recording: Recording, part_counts: NDArray[np.int64]) -> tu
     (begin, end), speed = speed_bends(recording), recording.winch_speed
     start, change = speed[:-1][part], np.diff(speed, axis=0)[part]
     begin, end = begin[part], end[part]
-    speeds = start + fraction * change + fraction * (1.0 - fraction) * ((1.0 - fraction) * begin - fraction * end)
+    speeds = start + fraction * change + bent_by(fraction, begin, end)
 
     def curvature(at: Array) -> Array:
         return -(4.0 - 6.0 * at) * begin - (2.0 - 6.0 * at) * end

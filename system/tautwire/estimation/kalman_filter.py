@@ -12,6 +12,7 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
+from ..recordings.speed_interpolation import bent_by
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
 from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_symbols import DisturbanceSymbols
@@ -242,14 +243,10 @@ class _Interval:
 
     def speeds_in_part(self, index: SX | int, count: int) -> list[SX]:
         """Winch speeds at the begin, in the middle, and at the end of one of some equal parts."""
-        begin_bend, end_bend = casadi.vertsplit(self.bends, self.speed.numel())
-
-        def bent(share: float) -> SX:
-            f = (index + share) / count
-            return f * (1.0 - f) * ((1.0 - f) * begin_bend - f * end_bend)
-
+        bends = casadi.vertsplit(self.bends, self.speed.numel())
         begin, end = (self.speed + (index + k) / count * (self.next_speed - self.speed) for k in (0, 1))
-        return [begin + bent(0.0), 0.5 * (begin + end) + bent(0.5), end + bent(1.0)]
+        lines = ((0.0, begin), (0.5, 0.5 * (begin + end)), (1.0, end))
+        return [line + bent_by((index + share) / count, *bends) for share, line in lines]
 
 
 def _statics_at(model: SymbolicModel, theta: SX) -> tuple[SX, SX]:

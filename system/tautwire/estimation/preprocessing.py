@@ -155,8 +155,7 @@ def prepare_data(
 
     def assembled(fitter: Fitter, data_split: DataSplit, notes: tuple[str, ...]) -> PreparedData:
         data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
-        of_recordings = (note for data in data_sets for note in data.recording.notes)
-        all_notes = (*truncation_notes, *prepared.notes, *notes, *data_split.notes, *of_recordings)
+        all_notes = (*truncation_notes, *prepared.notes, *notes, *data_split.notes, *_notes_of(data_sets))
         return PreparedData(data_split, data_sets, fitter, innovations_of(fitter, robot, data_split), all_notes)
 
     versions = speed_versions(fitter, robot, data_split, prepared.smoothing, policy.preprocessing)
@@ -189,14 +188,16 @@ def _with_likely_interpolation(
 
 
 def with_other_interpolation(prepared: PreparedData, robot: Robot, split: DataSplit) -> PreparedData:
-    """The same data as ``split`` has them, with winch speeds interpolated otherwise, and a note."""
+    """The same data with winch speeds interpolated as those of ``split``, and its recordings' notes."""
     fitter = with_fitted_disturbance(prepared.fitter, robot, (), split.estimation)
     data_sets = (split.estimation, split.validation)[: len(prepared.data_sets)]
-    recording = split.estimation.recording
-    kind = "linear" if recording.winch_acceleration is None else "cubic"
-    note = f"{recording.path}: winch speeds are {kind} between samples, which is far likelier"
+    others = [note for note in prepared.notes if note not in _notes_of(prepared.data_sets)]
     innovations = innovations_of(fitter, robot, split)
-    return PreparedData(split, data_sets, fitter, innovations, (*prepared.notes, note))
+    return PreparedData(split, data_sets, fitter, innovations, (*others, *_notes_of(data_sets)))
+
+
+def _notes_of(data_sets: Sequence[DataSet]) -> tuple[str, ...]:
+    return tuple(note for data in data_sets for note in data.recording.notes)
 
 
 def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:

@@ -110,12 +110,14 @@ class Recording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on what was read: the file's dialect, unknown columns, and speeds that are rates of rope lengths."""
+        """Remarks on what was read: the file's dialect, unknown columns, and where winch speeds are from."""
         notes = list(self.read_as)
         notes += [f"not read: {', '.join(self.unknown_columns)}"] if self.unknown_columns else []
         if self.rope_lengths:
             cables = ", ".join(map(str, self.rope_lengths))
             notes.append(f"winch speeds are the rates of the recorded rope lengths, of cables {cables}")
+        if self.winch_acceleration is not None:
+            notes.append("winch speeds are cubic between samples, as those of a smooth motion")
         return tuple(f"{self.path}: {one_line(note)}" for note in notes)
 
     @property

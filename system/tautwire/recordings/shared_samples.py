@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 # Digits that a file leaves out change a sample by less than its noise.
 TOLERANCE_IN_NOISE = 0.1
 RELATIVE_TOLERANCE = 1e-6
-MAX_NOISE_CORRELATION = 0.7
+MAX_NOISE_CORRELATION = 0.5
 MAX_SHARED_SAMPLES = 0.1  # of those that validate
 
 

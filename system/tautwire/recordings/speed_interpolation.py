@@ -14,6 +14,7 @@ Source: de Boor (2001), A Practical Guide to Splines, rev. ed., chapter IV.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,11 @@ def with_spline_speeds(recording: Recording) -> Recording:
 def with_linear_speeds(recording: Recording) -> Recording:
     """The recording with winch speeds linear between samples."""
     return replace(recording, winch_acceleration=None)
+
+
+def bent_by(fraction: Any, begin_bend: Any, end_bend: Any) -> Any:
+    """What bends add to the straight line at a fraction of a step: ``s (1 - s) ((1 - s) b_0 - s b_1)``, symbols too."""
+    return fraction * (1.0 - fraction) * ((1.0 - fraction) * begin_bend - fraction * end_bend)
 
 
 def speed_bends(recording: Recording) -> tuple[Array, Array]:

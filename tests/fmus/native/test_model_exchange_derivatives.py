@@ -302,7 +302,11 @@ def test_what_a_lagging_sensor_shows_has_none_with_respect_to_the_time(fmus_of: 
         shake(model, 0.01)
         unknowns = unknowns_of(model)
         references = [model.references[name] for name in unknowns]
-        shown = model.fmu.getDirectionalDerivative(references, [model.references["time"]], [1.0])
+        known = model.references["time"]
+        shown = model.fmu.getDirectionalDerivative(references, [known], [1.0])
+        seed = [float(name not in ("tension", "tension_rate")) for name in unknowns]
+        (adjoint,) = model.fmu.getAdjointDerivative(references, [known], seed, 1)
+    assert adjoint == pytest.approx(np.nansum(shown))
     unknown = {name for name, value in zip(unknowns, shown, strict=True) if np.isnan(value)}
     assert unknown == {"tension", "tension_rate"}
 

@@ -81,7 +81,8 @@ static int get_adjoint_derivative(const Slave *slave, const unsigned int *unknow
     /* Where the law has no value all is NaN, which is told once. */
     if (status == STATUS_OK) status = change_along(slave, along, change);
     along[seed_place(knowns[k])] = sensitivity[k] = 0.0;
-    for (j = 0; j < unknown_count; j++) sensitivity[k] += seed[j] * change[unknowns[j]];
+    for (j = 0; j < unknown_count; j++)
+      if (seed[j] != 0.0) sensitivity[k] += seed[j] * change[unknowns[j]];
   }
   return status;
 }
