@@ -131,6 +131,17 @@ def test_a_wrong_exit_point_is_told_with_where_it_fits() -> None:
     assert point == pytest.approx(example("three").anchors[CABLE - 1], abs=1.5)
 
 
+@pytest.mark.parametrize(("share", "is_told"), [(0.12, False), (0.3, True)])
+def test_an_exit_point_that_is_a_little_off_is_left_to_the_trace(share: float, is_told: bool) -> None:
+    robot, recording = example("three"), recorded()
+    points, start = np.array(robot.anchors), np.array(robot.platform.start)
+    away = np.cross(points[2] - start, [0.0, 1.0, 0.0])
+    points[2] += share * np.linalg.norm(points[2] - start) * away / np.linalg.norm(away)
+    lengths = np.linalg.norm(points - recording.position[:, None], axis=2)
+    odd = odd_winches(robot, recording.with_winch_speed(-np.gradient(lengths, recording.time, axis=0)))
+    assert ["its exit point fits" in each.cause for each in odd] == [True] * is_told
+
+
 def test_what_has_no_cause_is_left_to_the_trace() -> None:
     def other_motion(time: np.ndarray, speeds: np.ndarray) -> None:
         speeds[:, CABLE - 1] = np.std(speeds[:, CABLE - 1]) * np.sin(2.9 * time) * np.cos(0.41 * time)

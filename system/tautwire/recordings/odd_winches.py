@@ -27,7 +27,9 @@ LEAST_MOTION = 0.3
 INLIER_QUANTILE = 0.95
 # A cause leaves at most this share of the misfit, and of the cable's motion.
 MAX_MISFIT_LEFT, MAX_SHARE_LEFT = 0.25, 0.05
-MAX_MOVED = 2.0  # of an exit point's distance from the start
+# Of an exit point's distance from the start. Less is left to the trace: a pulley moves the point by its radius or more,
+# one of 24 mm by 7 % on a robot of 0.6 m.
+MIN_MOVED, MAX_MOVED = 0.15, 2.0
 DRUM_SCALES = (0.7, 1.4)
 # Of a unit that is written otherwise, and of drums; what is farther off is an angle or a count.
 MAX_UNIT_ERROR, WINCH_RATIOS = 0.03, (0.55, 1.8)
@@ -279,8 +281,8 @@ def _exit_point(robot: Robot, travel: _Travel, cable: int) -> Texts | None:
 
     fit = least_squares(missed, np.zeros(len(free)), loss="soft_l1", f_scale=0.1 * travel.motion[cable])
     left = float(np.sqrt(np.mean(missed(fit.x) ** 2))) / travel.motion[cable]
-    reach = MAX_MOVED * float(np.linalg.norm(declared - robot.platform.start))
-    if not _is_explained(left, travel.misfit(cable)) or np.linalg.norm(fit.x) > reach:
+    moved = float(np.linalg.norm(fit.x) / np.linalg.norm(declared - robot.platform.start))
+    if not (_is_explained(left, travel.misfit(cable)) and MIN_MOVED <= moved <= MAX_MOVED):
         return None
     declared[free] += fit.x
     written = ", ".join(f"{coordinate:.4g}" for coordinate in declared)
