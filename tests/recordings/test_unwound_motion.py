@@ -10,7 +10,7 @@ import pytest
 from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.recording_notes import recording_notes
-from tautwire.recordings.unwound_motion import unwound_motion_text
+from tautwire.recordings.unwound_motion import unwound_motion_error, unwound_motion_text
 from tests.support.pose_recordings import swinging_recording
 from tests.support.rigid_robots import underactuated_robot
 from tests.support.robots import EXAMPLES, example
@@ -73,3 +73,31 @@ def test_a_rope_that_was_slack_may_be_any_length() -> None:
 def test_winches_that_wind_are_not_judged() -> None:
     recording = read_recording(EXAMPLES / "three" / "check.csv", 3)
     assert unwound_motion_text(example("three"), recording) is None
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight", "cogiro", "ipanema"])
+def test_taut_ropes_that_grow_and_shrink_on_winches_that_stand_are_a_mistake_of_the_columns(name: str) -> None:
+    robot, recording = example(name), standing(name)
+    (error,) = recording_mistakes(robot, recording)
+    assert "no winch turns" in str(error) and "columns of the winches" in str(error)
+
+
+def test_taut_ropes_that_only_grow_may_creep() -> None:
+    robot, recording = example("three"), standing("three")
+    position = np.array(robot.platform.start) - np.outer(np.linspace(0.0, 1.0, len(recording.time)), [0.0, 0.0, 2.0])
+    assert unwound_motion_text(robot, replace(recording, position=position)) is not None
+    assert unwound_motion_error(robot, replace(recording, position=position)) is None
+
+
+def test_taut_ropes_whose_length_follows_their_tension_are_softer_than_declared() -> None:
+    robot, recording = example("three"), standing("three")
+    lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[:, None], axis=2)
+    tension = 1000.0 + 500.0 * (lengths - lengths.mean(axis=0)) / np.ptp(lengths, axis=0)
+    assert unwound_motion_text(robot, replace(recording, tension=tension)) is not None
+    assert unwound_motion_error(robot, replace(recording, tension=tension)) is None
+
+
+def test_a_platform_that_hands_lift_lets_ropes_hang() -> None:
+    recording = standing("three")
+    tension = np.where(recording.time[:, None] > 20.0, 0.0, recording.tension)
+    assert unwound_motion_error(example("three"), replace(recording, tension=tension)) is None

@@ -28,6 +28,7 @@ from .motion_regression import centred, dynamic_amplification, length_regression
 from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 from .standing_winches import all_winches_stand
+from .unwound_motion import unwound_motion_error
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     if declared & EFFECTS_ON_POSES:
         error = travel_error(robot, recording)
         return (error,) if error else ()
+    if error := unwound_motion_error(robot, recording):
+        return (error,)
     # Where no winch turns, what moves the platform is no matter of the columns.
     motion = None if all_winches_stand(robot, recording) else check_motion(robot, recording)
     travel = None if _follows(motion) else _excessive_travel(robot, recording)

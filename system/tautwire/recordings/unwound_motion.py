@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordingError
 from ..robot.schema import Robot
 from .geometry_reading import GeometryReading, recorded_poses
 from .recording import Recording
@@ -18,6 +19,8 @@ ROWS_USED, MIN_ROWS, INLIER_QUANTILE = 1000, 10, 0.95
 MIN_STRETCH_RATIO, MIN_LOAD_RATIO, MIN_NOISE_RATIO = 20.0, 8.0, 20.0
 MIN_TAUT_SHARE = 0.2
 MIN_LENGTH_SHARE = 0.003  # of a rope, which a survey and pulleys may be off by where the platform swings
+# Share of the lengths' range that ropes get back; correlation of each length with its tension, where ropes are softer.
+MIN_RETURN, MIN_SOFT_CORRELATION = 0.3, 0.7
 
 
 def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
@@ -27,6 +30,61 @@ def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
     tension was measured by far more than any load stretches them. A load that swings on one rope keeps the length of
     that. It is no error: hands lift platforms, and ropes creep. None where a rigid platform's orientation is not known.
     """
+    lengths = _unwound_lengths(robot, recording)
+    if lengths is None:
+        return None
+    return (
+        f"all winches stand, and by the positions ropes change in length by up to {np.ptp(lengths, axis=0).max():.3g} "
+        "m, far more than tension stretches them: the platform was held or lifted, ropes creep, or the columns of the "
+        "winches are not of this motion"
+    )
+
+
+def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError | None:
+    """The error of winches that stand throughout while ropes that are taut grow and shrink; None without one.
+
+    Hands that lift a platform let ropes hang, creep gives nothing back, and ropes that are softer than declared follow
+    their tension: none of these is an error.
+    """
+    lengths, rows = _unwound_lengths(robot, recording), _complete_rows(robot, recording)
+    if lengths is None or rows is None:
+        return None
+    measured = np.isfinite(recording.tension[rows]).all(axis=1)
+    lengths, tension = lengths[measured], recording.tension[rows[measured]]
+    if len(tension) < MIN_ROWS or not all(_is_taut(column) for column in tension.T):
+        return None
+    returned = np.maximum.accumulate(lengths, axis=0) - lengths
+    if np.any(returned.max(axis=0) < MIN_RETURN * np.ptp(lengths, axis=0)):
+        return None
+    changes, pulls = lengths - lengths.mean(axis=0), tension - tension.mean(axis=0)
+    correlations = np.sum(changes * pulls, axis=0) / np.sqrt(np.sum(changes**2, axis=0) * np.sum(pulls**2, axis=0))
+    if np.all(correlations > MIN_SOFT_CORRELATION):
+        return None
+    problem = (
+        f"no winch turns, and taut ropes change in length by up to {np.ptp(lengths, axis=0).max():.3g} m by "
+        "the positions, far more than tension stretches them"
+    )
+    return RecordingError(
+        recording.path, problem, "the columns of the winches are not of this motion: log their speeds"
+    )
+
+
+def _unwound_lengths(robot: Robot, recording: Recording) -> Array | None:
+    """Geometric lengths (M, n) that change by far more than winches that stand allow; None where they do not."""
+    rows = _complete_rows(robot, recording)
+    if rows is None:
+        return None
+    lengths = GeometryReading().directions(robot, recorded_poses(recording, rows))[0]
+    if not np.isfinite(lengths).all():
+        return None
+    noise = float(np.nan_to_num(white_noise_deviation(recording.position)))
+    limits = np.maximum(_largest_changes(robot, recording.tension[rows], lengths), MIN_NOISE_RATIO * noise)
+    limits = np.maximum(limits, MIN_LENGTH_SHARE * lengths.mean(axis=0))
+    return None if np.any(_deviations(lengths) <= limits) else lengths
+
+
+def _complete_rows(robot: Robot, recording: Recording) -> NDArray[np.intp] | None:
+    """Rows with a whole pose, (M,), while all winches stand; None where one turns, or poses are too few."""
     is_rigid = robot.platform.is_rigid_body
     if (
         not all_winches_stand(robot, recording)
@@ -39,20 +97,7 @@ def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
     rows = np.flatnonzero(np.isfinite(pose).all(axis=1))
     if rows.size < MIN_ROWS or measured.shape[1] < len(robot.axes_in_plane):
         return None
-    rows = rows[:: max(1, rows.size // ROWS_USED)]
-    lengths = GeometryReading().directions(robot, recorded_poses(recording, rows))[0]
-    if not np.isfinite(lengths).all():
-        return None
-    noise = float(np.nan_to_num(white_noise_deviation(recording.position)))
-    limits = np.maximum(_largest_changes(robot, recording.tension[rows], lengths), MIN_NOISE_RATIO * noise)
-    limits = np.maximum(limits, MIN_LENGTH_SHARE * lengths.mean(axis=0))
-    if np.any(_deviations(lengths) <= limits):
-        return None
-    return (
-        f"all winches stand, and by the positions ropes change in length by up to {np.ptp(lengths, axis=0).max():.3g} "
-        "m, far more than tension stretches them: the platform was held or lifted, ropes creep, or the columns of the "
-        "winches are not of this motion"
-    )
+    return rows[:: max(1, rows.size // ROWS_USED)]
 
 
 def _deviations(values: Array) -> Array:
@@ -71,8 +116,13 @@ def _largest_changes(robot: Robot, tension: Array, lengths: Array) -> Array:
         compliance, taut = length / (rope.modulus * rope.area), column[np.isfinite(column)]
         if taut.size < MIN_ROWS or not np.ptp(taut):
             limits.append(MIN_LOAD_RATIO * compliance * load)
-        elif taut.min() < MIN_TAUT_SHARE * np.median(taut):
+        elif not _is_taut(taut):
             limits.append(np.inf)
         else:
             limits.append(MIN_STRETCH_RATIO * compliance * float(np.std(taut)))
     return np.array(limits)
+
+
+def _is_taut(tension: Array) -> bool:
+    """Whether a rope's measured tensions (M,) never come close to zero; False where all are the same."""
+    return bool(np.ptp(tension) > 0.0 and tension.min() >= MIN_TAUT_SHARE * np.median(tension) > 0.0)
