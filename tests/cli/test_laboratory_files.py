@@ -330,6 +330,7 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     ),
     "one speed in half": (scaled(SPEEDS[1:2], 0.5), "gears, drums or intervals of time 2 times those"),
     "one speed twice as large": (scaled(SPEEDS[1:2], 2.0), "gears, drums or intervals of time 0.5 times those"),
+    "speeds that were never logged": (scaled(SPEEDS, 0.0), "the columns of the winches are not of this motion"),
     "another robot": (
         lambda frame: text_of(pd.read_csv(EXAMPLES / "caroca" / "fit.csv", nrows=ROWS)),
         "does not match the positions",
@@ -426,6 +427,14 @@ def test_a_code_of_a_missing_number_is_left_out_and_told(column: str, tmp_path: 
     assert checked.problems == ()
     assert any(f"{column}: 2 samples at -9999, as programs write" in note for note in checked.notes)
     assert not any("outliers" in note for note in checked.notes)
+
+
+def test_positions_of_too_few_digits_are_told_with_the_noise_that_they_have(tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    rounded = frame.assign(**{axis: frame[axis].round(2) for axis in AXES})
+    checked = check_files(laboratory.robot(ROBOT), laboratory.recording(text_of(rounded)))
+    assert checked.problems == ()
+    assert any("values are in steps of 0.01 m" in note and "0.00289 m is used" in note for note in checked.notes)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.5])

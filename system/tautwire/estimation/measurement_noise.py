@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import log
+from math import log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from scipy.signal import spectrogram
 from ..errors import InputError
 from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
-from ..recordings.white_noise_estimate import white_noise_deviation
+from ..recordings.white_noise_estimate import quantization_step, white_noise_deviation
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from .kalman_filter import Noise
@@ -68,12 +68,12 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
 
     A winch speed may be declared free of noise; no position or tension is.
     """
-    position = robot.sensors.position_noise or white_noise_deviation(recording.position)
+    position = robot.sensors.position_noise or _measured_noise(recording.position)
     speed = robot.sensors.winch_speed_noise
     rotation = _rotation_noise(robot, recording) if robot.platform.is_rigid_body else None
     return Noise(
         position=position,
-        tension=robot.sensors.tension_noise or white_noise_deviation(recording.tension),
+        tension=robot.sensors.tension_noise or _measured_noise(recording.tension),
         winch_speed=white_noise_deviation(recording.winch_speed) if speed is None else speed,
         rotation=rotation,
         moment_arm=rotation_scale(robot),
@@ -82,6 +82,12 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
         else UNMEASURED_INITIAL_DEVIATION / rotation_scale(robot),
         start_position=INITIAL_POSITION_SIGMAS * position if recording.has_position else UNMEASURED_INITIAL_DEVIATION,
     )
+
+
+def _measured_noise(samples: Array) -> float:
+    """Standard deviation of white noise on samples (N, k), or of their rounding where that is larger."""
+    rounding = max(quantization_step(column) for column in samples.T) / sqrt(12.0)
+    return max(white_noise_deviation(samples), rounding)
 
 
 def declared_noise(robot: Robot) -> Noise:
@@ -164,10 +170,40 @@ def check_noise(
     return replace(checked, noise=replace(checked.noise, winch_speed=measured), notes=(*checked.notes, note))
 
 
+def _check_digits(
+    checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
+) -> CheckedNoise:
+    """Take no noise for less than what rounding adds, step / sqrt(12)."""
+    deviations = list(checked.noise.of_outputs(recordings[0].cable_count))
+    outputs_by_finding: dict[str, list[str]] = {}
+    for column in columns:
+        step = max(quantization_step(_signal(recording, column)) for recording in recordings)
+        rounding, declared = step / sqrt(12.0), deviations[column]
+        if rounding > policy.max_noise_ratio * declared:
+            deviations[column] = rounding
+            finding = (
+                f"values are in steps of {step:.3g} {unit}, where noise of {declared:.3g} {unit} is declared: record "
+                f"more digits; {rounding:.3g} {unit} is used"
+            )
+            outputs_by_finding.setdefault(finding, []).append(output_names(recordings[0].cable_count, True)[column])
+    return _with_findings(checked, deviations, outputs_by_finding)
+
+
+def _with_findings(
+    checked: CheckedNoise, deviations: Sequence[float], outputs_by_finding: Mapping[str, Sequence[str]]
+) -> CheckedNoise:
+    if not outputs_by_finding:
+        return checked
+    notes = [f"{', '.join(outputs)}: {finding}" for finding, outputs in outputs_by_finding.items()]
+    noise = replace(checked.noise, own=tuple(deviations))
+    return replace(checked, noise=noise, notes=(*checked.notes, *notes))
+
+
 def _check_sensor_kind(
     checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
 ) -> CheckedNoise:
     """Test the outputs of one kind of sensor, whose noise has one colour."""
+    checked = _check_digits(checked, recordings, columns, unit, policy)
     outputs_by_finding: dict[str, list[str]] = {}
     is_coloured = checked.is_coloured
     declared = checked.noise.of_outputs(recordings[0].cable_count)
@@ -206,10 +242,7 @@ def _check_sensor_kind(
                 "the noise is larger and coloured, or the sampling misses fast motion; the declared noise is used"
             )
         outputs_by_finding.setdefault(finding, []).append(name)
-    if not outputs_by_finding:
-        return checked
-    notes = [f"{', '.join(outputs)}: {finding}" for finding, outputs in outputs_by_finding.items()]
-    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), is_coloured, (*checked.notes, *notes))
+    return _with_findings(replace(checked, is_coloured=is_coloured), deviations, outputs_by_finding)
 
 
 def _signal(recording: Recording, column: int) -> Array:

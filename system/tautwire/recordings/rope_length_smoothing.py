@@ -27,15 +27,12 @@ from scipy.interpolate import make_smoothing_spline
 from scipy.optimize import minimize_scalar
 
 from .recording import Recording
-from .white_noise_estimate import white_noise_deviation
+from .white_noise_estimate import quantization_step, white_noise_deviation
 
 Array = NDArray[np.float64]
 
 # Lengths closer than this (m) are the same count, written with a rounding error.
 MIN_RESOLUTION = 1e-9
-# Of third differences: the quantile that is a count, as bridged gaps have fractions of it, and the share that has to be
-# whole counts within a fraction. Of differences of any size two in five would be.
-COUNT_QUANTILE, MIN_WHOLE_SHARE, MAX_COUNT_FRACTION = 0.05, 0.9, 0.2
 # Samples by which a penalty is chosen, those with the most travel; and angular frequencies of which means are taken.
 MAX_SAMPLES, FREQUENCY_COUNT = 10_000, 2_001
 # Shortest period of a motion that is passed, in samples, and the longest in s; and the tolerance of a penalty's decade.
@@ -112,22 +109,7 @@ def length_noise(lengths: Array) -> float:
     """Standard deviation (m) of a recorded length (N,): that of a count's rounding, or of white noise where larger."""
     if np.ptp(lengths) <= MIN_RESOLUTION:
         return 0.0
-    return max(_count_size(lengths) / 12.0**0.5, white_noise_deviation(lengths[:, None]))
-
-
-def _count_size(lengths: Array) -> float:
-    """The count (m) of which third differences are multiples, 0.0 where they are of none.
-
-    First differences of a steady motion, and second ones of a steady acceleration, are multiples of their own size.
-    """
-    differences = np.abs(np.diff(lengths, 3))
-    differences = differences[differences > MIN_RESOLUTION]
-    if not len(differences):
-        return 0.0
-    count = float(np.quantile(differences, COUNT_QUANTILE))
-    multiples = differences / count
-    is_whole = np.abs(multiples - np.round(multiples)) <= MAX_COUNT_FRACTION
-    return count if np.mean(is_whole) >= MIN_WHOLE_SHARE else 0.0
+    return max(quantization_step(lengths) / 12.0**0.5, white_noise_deviation(lengths[:, None]))
 
 
 def _trapezoidal(time: Array, lengths: Array, rates: Array) -> Array:

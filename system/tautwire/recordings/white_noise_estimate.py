@@ -1,4 +1,4 @@
-"""Estimates the standard deviation of white noise on a smooth signal from its differences."""
+"""Estimates white noise on a smooth signal, and the step in which it was recorded, from its differences."""
 
 from __future__ import annotations
 
@@ -13,6 +13,10 @@ DIFFERENCE_ORDER = 6
 NORMAL_ABSOLUTE_MEDIAN = 0.6745
 # Files carry about seven digits, which bounds the noise from below.
 RELATIVE_RESOLUTION = 1e-7
+# Of third differences: the quantile that is a step, as bridged gaps have fractions of it, and the share that has to be
+# whole steps within a fraction. Of differences of any size two in five would be; smaller ones are rounding errors.
+SMALLEST_DIFFERENCE = 1e-9
+STEP_QUANTILE, MIN_WHOLE_SHARE, MAX_FRACTION = 0.05, 0.9, 0.2
 
 
 def white_noise_deviation(samples: Array) -> float:
@@ -37,3 +41,19 @@ def _absolute_differences(column: Array) -> Array:
     differences = np.abs(np.diff(column, DIFFERENCE_ORDER))
     finite: Array = differences[np.isfinite(differences)]
     return finite if len(finite) else np.abs(np.diff(column[np.isfinite(column)], DIFFERENCE_ORDER))
+
+
+def quantization_step(signal: Array) -> float:
+    """Quantization step of a signal (N,), as of counts or of too few digits; 0 where noise is larger, or there is none.
+
+    The number of which third differences are whole multiples: first differences of a steady motion, and second ones of
+    a steady acceleration, are multiples of their own size. Rounding has a standard deviation of step / sqrt(12).
+    """
+    differences = np.abs(np.diff(signal[np.isfinite(signal)], 3))
+    differences = differences[differences > SMALLEST_DIFFERENCE]
+    if not len(differences):
+        return 0.0
+    step = float(np.quantile(differences, STEP_QUANTILE))
+    multiples = differences / step
+    is_whole = np.abs(multiples - np.round(multiples)) <= MAX_FRACTION
+    return step if np.mean(is_whole) >= MIN_WHOLE_SHARE else 0.0
