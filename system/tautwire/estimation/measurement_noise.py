@@ -173,20 +173,20 @@ def check_noise(
 def _check_digits(
     checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
 ) -> CheckedNoise:
-    """Take no noise for less than what rounding adds, step / sqrt(12)."""
-    deviations = list(checked.noise.of_outputs(recordings[0].cable_count))
+    """Take no noise for less than what rounding adds, step / sqrt(12), which has a memory where motion is slow."""
+    is_coloured, deviations = checked.is_coloured, list(checked.noise.of_outputs(recordings[0].cable_count))
     outputs_by_finding: dict[str, list[str]] = {}
     for column in columns:
         step = max(quantization_step(_signal(recording, column)) for recording in recordings)
         rounding, declared = step / sqrt(12.0), deviations[column]
         if rounding > policy.max_noise_ratio * declared:
-            deviations[column] = rounding
+            is_coloured, deviations[column] = True, rounding
             finding = (
                 f"values are in steps of {step:.3g} {unit}, where noise of {declared:.3g} {unit} is declared: record "
-                f"more digits; {rounding:.3g} {unit} is used"
+                f"more digits; {rounding:.3g} {unit} is used, and its memory is estimated with the disturbance"
             )
             outputs_by_finding.setdefault(finding, []).append(output_names(recordings[0].cable_count, True)[column])
-    return _with_findings(checked, deviations, outputs_by_finding)
+    return _with_findings(replace(checked, is_coloured=is_coloured), deviations, outputs_by_finding)
 
 
 def _with_findings(
