@@ -181,6 +181,15 @@ def test_what_breaks_a_bound_is_refused_with_bound_and_cable() -> None:
     assert caught.value.cable is not None and caught.value.tension is not None and caught.value.tension > 200.0
 
 
+@pytest.mark.parametrize("rule", ("barycentre", "closed_form"))
+def test_rules_that_need_bounds_take_them_from_the_robot_file_whatever_the_number_of_cables(rule: str) -> None:
+    """Four cables of a ring have a self-stress where they hang level, by which neighbours differ."""
+    robot = replace(suspended_robot(4), tension=TensionLimits(50.0, 900.0, 300.0))
+    assert static_equilibrium(robot, rule=rule).tensions == pytest.approx(static_tensions(robot))
+    with pytest.raises(UnreachableError, match="no tensions between 300 and 900 N hold the platform there"):
+        static_equilibrium(replace(robot, tension=TensionLimits(300.0, 900.0, 400.0)), rule=rule)
+
+
 def test_a_weight_that_pulling_cables_cannot_balance_is_refused_for_want_of_wrench_closure() -> None:
     robot = shifted(crane_robot(), (2.5, 0.0, 0.26))
     matrix, load = structure_matrix(robot), load_wrench(robot, np.array(robot.platform.start), (1.0, 0.0, 0.0, 0.0))

@@ -104,6 +104,35 @@ def test_the_closed_form_is_nearest_to_the_middle_and_keeps_the_bounds_where_tha
     assert at_bounds >= 3
 
 
+@pytest.mark.parametrize("count", (3, 4, 5, 6))
+@pytest.mark.parametrize("rule", RULES)
+def test_every_rule_gives_the_only_tensions_of_few_cables(rule: str, count: int) -> None:
+    draws = np.random.default_rng(count)
+    matrix, wanted = draws.normal(size=(6, count)), draws.uniform(120.0, 900.0, count)
+    found = distribute_by_rule(matrix, matrix @ wanted, LIMITS, rule)
+    assert found == pytest.approx(wanted, rel=1e-9)
+    unlimited = distribute_by_rule(matrix, matrix @ wanted, TensionLimits(0.0, float("inf"), 0.0), rule)
+    assert unlimited == pytest.approx(wanted, rel=1e-9)
+    assert distribute_by_rule(matrix, 9.0 * matrix @ wanted, LIMITS, rule) is None
+    if count < 6:
+        beside = null_space(matrix.T)[:, 0]
+        assert distribute_by_rule(matrix, matrix @ wanted + 50.0 * beside, LIMITS, rule) is None
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_a_dependent_row_changes_no_distribution(rule: str) -> None:
+    """Four cables of a point, one of which the bounds hold: five rows of rank three."""
+    matrix = np.random.default_rng(3).normal(size=(3, 4))
+    load = matrix @ np.array([120.0, 900.0, 150.0, 800.0])
+    combined = np.vstack([matrix, matrix.sum(axis=0), matrix[0] - matrix[2]])
+    alone = distribute_by_rule(matrix, load, LIMITS, rule)
+    assert alone is not None and matrix @ alone == pytest.approx(load)
+    both = distribute_by_rule(combined, np.array([*load, load.sum(), load[0] - load[2]]), LIMITS, rule)
+    assert both == pytest.approx(alone, rel=1e-6)
+    if rule == "closed_form":
+        assert np.any((alone == LIMITS.minimum) | (alone == LIMITS.maximum))
+
+
 @pytest.mark.parametrize("rule", RULES)
 def test_every_rule_tells_that_no_tensions_are_feasible(rule: str) -> None:
     matrix, load = redundant(8, 5000.0)

@@ -27,7 +27,7 @@ from .cable_routes import attachment_points, cable_routes, unreachable_error
 from .kinematics import structure_matrix_at, turned_orientation, validated_pose
 from .schema import Quaternion, Robot, TensionLimits
 from .static_load import fixed_point, static_load
-from .tension_distribution import DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
+from .tension_distribution import BOUNDED_RULES, DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
 
 Array = NDArray[np.float64]
 Balance = tuple[Array, Array]
@@ -71,7 +71,8 @@ def static_equilibrium(
     The ``orientation`` is a unit quaternion, by default the declared one. Where it leaves a moment and fewer than six
     cables hold the platform, the nearest orientation in equilibrium is taken, with no tension below the minimum of the
     robot file if there is one such. Tensions that are not unique are distributed by a ``rule`` of
-    :data:`tautwire.robot.tension_distribution.RULES`, with more than six cables within the limits of the robot file.
+    :data:`tautwire.robot.tension_distribution.RULES`, with more than six cables, or by a rule that needs bounds, within
+    the limits of the robot file.
 
     Raises UnreachableError where no orientation near the declared one is in equilibrium, or where a cable would have
     to push or to break a limit; ArgumentError for an invalid argument.
@@ -175,7 +176,8 @@ def _balancing_tensions(robot: Robot, position: Array, balance: Balance, rule: s
         if tensions[worst] < -BALANCE_TOLERANCE * float(np.max(np.abs(tensions))):
             raise unreachable_error(robot, position, "a cable cannot push", worst + 1, float(tensions[worst]))
         return np.maximum(tensions, 0.0)
-    limits = (robot.tension or DEFAULT_LIMITS) if robot.cable_count > FREEDOMS else DEFAULT_LIMITS
+    is_bounded = robot.cable_count > FREEDOMS or rule in BOUNDED_RULES
+    limits = (robot.tension or DEFAULT_LIMITS) if is_bounded else DEFAULT_LIMITS
     distributed = distribute_by_rule(matrix, load, limits, rule)
     if distributed is None:
         raise _limit_error(robot, position, matrix, load, limits)

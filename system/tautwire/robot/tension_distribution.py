@@ -22,6 +22,7 @@ BALANCE_TOLERANCE = 1e-6
 RANK_TOLERANCE = 1e-9
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 RULES = ("nearest", "least_norm", "barycentre", "closed_form")
+BOUNDED_RULES = ("barycentre", "closed_form")
 
 
 def distribute_tensions(
@@ -97,19 +98,25 @@ def distribute_by_rule(
 
     ``nearest`` to the preferred tension, ``least_norm``, the ``barycentre`` of all feasible tensions, or the improved
     ``closed_form``, which may miss feasible ones near the bounds; the last two need a finite maximum. Arguments as
-    :func:`distribute_tensions` takes them, of full row rank.
+    :func:`distribute_tensions` takes them. All rules give the same where only one distribution balances the load, as
+    of fewer cables than degrees of freedom.
 
-    Raises ArgumentError for another rule, or where the maximum is not finite.
+    Raises ArgumentError for another rule, or where a maximum is needed and not finite.
     """
     if rule not in RULES:
         raise ArgumentError("distribute_by_rule: rule", rule, f"is {rule!r}", f"write {suggest_name(rule, RULES)}")
-    if rule in ("nearest", "least_norm"):
-        preferred = limits.preferred if rule == "nearest" else 0.0
+    span, _ = _row_span(structure_matrix)
+    if rule not in BOUNDED_RULES or span.shape[1] == structure_matrix.shape[1]:
+        preferred = 0.0 if rule == "least_norm" else limits.preferred
         return distribute_tensions(structure_matrix, load, replace(limits, preferred=preferred))
     if not np.isfinite(limits.maximum):
         problem = f"is {rule}, which needs a maximum tension"
         raise ArgumentError("distribute_by_rule: rule", rule, problem, "give [tension] a maximum in the robot file")
-    return (_barycentre if rule == "barycentre" else _closed_form)(structure_matrix, load, limits)
+    if np.linalg.norm(load - span @ (span.T @ load)) > BALANCE_TOLERANCE * max(float(np.linalg.norm(load)), 1.0):
+        return None
+    # Cables in a plane, or about one axis, have dependent rows.
+    distribute = _barycentre if rule == "barycentre" else _closed_form
+    return distribute(span.T @ structure_matrix, span.T @ load, limits)
 
 
 def _closed_form(structure_matrix: Array, load: Array, limits: TensionLimits) -> Array | None:
@@ -145,8 +152,6 @@ def _barycentre(structure_matrix: Array, load: Array, limits: TensionLimits) -> 
     parallel manipulators; Lamaury and Gouttefarde (2013).
     """
     particular, null_basis = np.linalg.pinv(structure_matrix) @ load, null_space(structure_matrix)
-    if np.linalg.norm(structure_matrix @ particular - load) > BALANCE_TOLERANCE * max(float(np.linalg.norm(load)), 1.0):
-        return None
     normals = np.vstack([-null_basis, null_basis])
     offsets = np.concatenate([particular - limits.minimum, limits.maximum - particular])
     dimension = null_basis.shape[1]
