@@ -15,6 +15,7 @@ from typing import Any
 import control
 import numpy as np
 from numpy.typing import NDArray
+from slycot import ab13md
 
 from tautwire_fmu.laws.effects import MODULUS
 
@@ -27,11 +28,14 @@ from .reachable_plant import reachable_plant
 from .sampled_plant import ramp_plant
 
 Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
 
 FREQUENCY_COUNT = 200
 MIN_RELATIVE_FREQUENCY = 1e-3
 # An error of 11 % in all gains, or 6 degrees of phase: moduli and payloads are known no better.
 MIN_DISK_MARGIN = 0.1
+# Of an uncertainty, as SLICOT's AB13MD numbers them.
+COMPLEX_BLOCK = 2
 
 
 @dataclass(frozen=True)
@@ -146,12 +150,12 @@ def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
         return Margins(radius, 0.0, 0.0, 0.0, 0.0)
     nyquist_frequency = np.pi / regulator.dt
     omega = np.geomspace(MIN_RELATIVE_FREQUENCY * nyquist_frequency, 0.999 * nyquist_frequency, FREQUENCY_COUNT)
-    at_winches, at_sensors = -feedback * plant, -plant * feedback
-    winch_disk = _disk_margin(at_winches, omega)
-    sensor_disks = [_disk_margin(loop, omega) for loop in _single_loops(at_sensors)]
-    classical = [_classical_margins(loop, omega) for loop in _single_loops(at_winches)]
+    plant_response, feedback_response = (_response(system, omega) for system in (plant, feedback))
+    at_winches = _sensitivities(-feedback_response @ plant_response)
+    at_sensors = _single(_sensitivities(-plant_response @ feedback_response))
+    classical = [_classical_margins(1.0 / each - 1.0, omega, regulator.dt) for each in _single(at_winches)]
     gain, phase = (min(values) for values in zip(*classical, strict=True))
-    return Margins(radius, winch_disk, min(sensor_disks), gain, phase)
+    return Margins(radius, _disk_margin(at_winches), float(1.0 / np.max(np.abs(at_sensors - 0.5))), gain, phase)
 
 
 def margin_notes(plants: Sequence[LinearPlant], knots: Sequence[Knot]) -> tuple[str, ...]:
@@ -191,22 +195,40 @@ def margins_over(
     return worst
 
 
-def _single_loops(loop: Any) -> Iterator[Any]:
-    """Each loop opened by itself, with the others closed."""
-    count = loop.ninputs
-    for index in range(count):
-        others = np.eye(count)
-        others[index, index] = 0.0
-        yield control.feedback(loop, control.ss([], [], [], others, loop.dt))[index, index]
+def _response(system: Any, omega: Array) -> ComplexArray:
+    """Frequency response (F, outputs, inputs)."""
+    response: ComplexArray = np.moveaxis(system(np.exp(1j * omega * system.dt), squeeze=False), 2, 0)
+    return response
 
 
-def _disk_margin(loop: Any, omega: Array) -> float:
-    return float(control.disk_margins(loop, omega)[0])
+def _sensitivities(loops: ComplexArray) -> ComplexArray:
+    """Sensitivity ``(1 + L)^-1`` of loops (F, k, k) under negative feedback."""
+    return np.asarray(np.linalg.inv(np.eye(loops.shape[1]) + loops), dtype=np.complex128)
 
 
-def _classical_margins(loop: Any, omega: Array) -> tuple[float, float]:
+def _single(sensitivities: ComplexArray) -> ComplexArray:
+    """Sensitivity of each loop opened by itself, with the others closed, (k, F)."""
+    return np.diagonal(sensitivities, axis1=1, axis2=2).T
+
+
+def _disk_margin(sensitivities: ComplexArray) -> float:
+    """Disk margin of all loops at once, by the largest structured singular value of ``S - 1/2``.
+
+    The largest singular value is an upper bound of it, which rules out most frequencies.
+    """
+    count = sensitivities.shape[1]
+    blocks, kinds = np.ones(count, dtype=int), np.full(count, COMPLEX_BLOCK)
+    balanced = sensitivities - 0.5 * np.eye(count)
+    bounds, largest = np.linalg.norm(balanced, ord=2, axis=(1, 2)), 0.0
+    for index in np.argsort(-bounds):
+        if bounds[index] <= largest:
+            break
+        largest = max(largest, float(ab13md(balanced[index], blocks, kinds)[0]))
+    return 1.0 / largest
+
+
+def _classical_margins(loop: ComplexArray, omega: Array, period: float) -> tuple[float, float]:
     """Smallest gain margin, as a factor above 1 in either direction, and phase margin in degrees."""
-    response = control.frequency_response(loop, omega)
-    gains, phases, *_ = control.stability_margins(response, returnall=True)
+    gains, phases, *_ = control.stability_margins(control.frd(loop, omega, period), returnall=True)
     factors = np.maximum(gains, 1.0 / np.maximum(gains, np.finfo(float).tiny))
     return float(np.min(factors, initial=np.inf)), float(np.min(np.abs(phases), initial=np.inf))
