@@ -39,16 +39,19 @@ def test_maps_undo_each_other() -> None:
     assert back.dt == PERIOD
 
 
-def test_integrator_gets_the_norm_that_the_textbook_gives_it() -> None:
-    # 1/s: its smallest four-block norm is the square root of 2; sampled slowly enough it hardly differs.
-    plant = to_sampled(control.ss(0.0, 1.0, 1.0, 0.0), PERIOD)
+@pytest.mark.parametrize(("pole", "gain"), ((0.0, 1.0), (1.0, 0.01), (1.0, 1e-5)), ids=("integrator", "100", "1e5"))
+def test_a_first_order_plant_gets_the_norm_that_the_textbook_gives_it(pole: float, gain: float) -> None:
+    # k / (s - p): its smallest four-block norm is sqrt(1 + X Z), of two Riccati equations; sampled it hardly differs.
+    norm = np.hypot(1.0, (pole + np.hypot(pole, gain)) / gain)
+    process = control.ss(pole, gain, 1.0, 0.0)
+    plant = to_sampled(process, PERIOD)
     controller = synthesise_controller(plant, control.ss([], [], [], 1.0))
     continuous = to_continuous(controller)
-    loop = control.feedback(1.0, -control.ss(0.0, 1.0, 1.0, 0.0) * continuous)
+    loop = control.feedback(1.0, -process * continuous)
     omega = np.geomspace(1e-3, 1e3, 500)
-    s, k, g = loop(1j * omega), continuous(1j * omega), 1.0 / (1j * omega)
+    s, k, g = loop(1j * omega), continuous(1j * omega), process(1j * omega)
     blocks = np.abs(s) * np.sqrt((1.0 + np.abs(k) ** 2) * (1.0 + np.abs(g) ** 2))
-    assert np.sqrt(2.0) < np.max(blocks) < 1.01 * NORM_FACTOR * np.sqrt(2.0)
+    assert norm < np.max(blocks) < 1.01 * NORM_FACTOR * norm
     assert np.max(np.abs(control.feedback(plant, controller, 1).poles())) < 1.0
 
 

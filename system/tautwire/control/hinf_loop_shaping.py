@@ -22,6 +22,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 from slycot import sb10ad
+from slycot.exceptions import SlycotArithmeticError
 from threadpoolctl import threadpool_limits
 
 from ..linear import LinearPlant, linearise
@@ -40,7 +41,9 @@ Array = NDArray[np.float64]
 
 # The optimal controller has poles at infinity; a slightly suboptimal one has not.
 NORM_FACTOR = 1.1
-SB10AD_GIVEN_NORM_JOB = 4
+SB10AD_BISECTION_JOB, SB10AD_GIVEN_NORM_JOB = 1, 4
+# Bisection takes as many steps as its first bound has digits; most loops have a norm below ten.
+FIRST_NORM_BOUND, LAST_NORM_BOUND = 10.0, 1e100
 # Shift of the plant's integrators off the imaginary axis, in 1/s.
 INTEGRATOR_LEAK = 1e-5
 
@@ -72,23 +75,23 @@ def synthesise_controller(plant: Any, weights: Any) -> Any:
             [shaped.D, identity, shaped.D],
         ]
     )
+    sizes = (state_count, B.shape[1], C.shape[0], input_count, output_count)
     # Small matrices: thread synchronisation would dominate the time.
     with threadpool_limits(limits=1, user_api="blas"):
-        _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), output_count, input_count)
-        synthesis = sb10ad(
-            state_count,
-            B.shape[1],
-            C.shape[0],
-            input_count,
-            output_count,
-            NORM_FACTOR * norm,
-            A,
-            B,
-            C,
-            D,
-            job=SB10AD_GIVEN_NORM_JOB,
-        )
+        norm = _smallest_norm(sizes, (A, B, C, D))
+        synthesis = sb10ad(*sizes, NORM_FACTOR * norm, A, B, C, D, job=SB10AD_GIVEN_NORM_JOB)
     return to_sampled(control.ss(*synthesis[1:5]) * weights, period)
+
+
+def _smallest_norm(sizes: tuple[int, ...], matrices: tuple[Array, ...], bound: float = FIRST_NORM_BOUND) -> float:
+    """The norm of the optimal controller, by bisection below a bound that some controller keeps."""
+    try:
+        return float(sb10ad(*sizes, bound, *matrices, job=SB10AD_BISECTION_JOB)[0])
+    except SlycotArithmeticError:
+        # No controller keeps so low a bound, or none at all.
+        if bound >= LAST_NORM_BOUND:
+            raise
+    return _smallest_norm(sizes, matrices, min(bound**4, LAST_NORM_BOUND))
 
 
 def to_continuous(system: Any) -> Any:
