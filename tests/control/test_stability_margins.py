@@ -23,6 +23,7 @@ from tautwire.control import (
     robot_with,
     speed_controller,
 )
+from tautwire.control.stability_margins import FREQUENCY_COUNT, MIN_RELATIVE_FREQUENCY
 from tautwire.robot.schema import EffectSetting, Robot
 from tests.support.robots import example
 
@@ -64,6 +65,14 @@ def test_margins_agree_with_the_sensitivity(design: Controller) -> None:
     whole = 1.0 / np.max(np.linalg.norm(inner - 0.5 * np.eye(3), ord=2, axis=(1, 2)))
     single = 1.0 / np.max(np.abs(np.diagonal(inner, axis1=1, axis2=2) - 0.5))
     assert whole * 0.99 < margins.winch_disk < single * 1.01
+
+
+def test_margins_of_all_winches_at_once_are_those_of_python_control(design: Controller) -> None:
+    plant, feedback = ramp_plant(design.linear, 0.01), speed_controller(design.regulator)
+    nyquist = np.pi / 0.01
+    omega = np.geomspace(MIN_RELATIVE_FREQUENCY * nyquist, 0.999 * nyquist, FREQUENCY_COUNT)
+    expected = control.disk_margins(-feedback * plant, omega)[0]
+    assert margins_of(design.linear, design.knots()[0]).winch_disk == pytest.approx(expected, rel=1e-6)
 
 
 def at(system: Any, z: Array) -> Array:
