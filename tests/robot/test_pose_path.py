@@ -12,7 +12,7 @@ from tautwire.robot.kinematics import inverse_kinematics
 from tautwire.robot.pose_path import pose_path, sample_poses
 from tautwire.robot.pose_trajectory import PoseTrajectory, slerp
 from tautwire.robot.rigid_equilibrium import static_equilibrium
-from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.schema import EffectSetting, Robot, TensionLimits
 from tautwire.robot.trajectory import Line, Trajectory
 from tautwire.robot.winch_speeds import ideal_winch_speeds
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
@@ -68,6 +68,23 @@ def test_fewer_than_six_cables_pass_through_equilibria() -> None:
     assert ideal_winch_speeds(robot, line(robot), TIMES) == pytest.approx(-length_rates(robot, line(robot)), abs=1e-8)
     ends = sample_poses("test", robot, path, np.array([0.0, 2.0]))
     assert not np.any(ends.twist) and not np.any(ends.acceleration)
+
+
+@pytest.mark.validate
+def test_a_path_away_from_the_middle_of_a_ring_passes_smoothly_over_a_jump_of_the_nearest_equilibrium() -> None:
+    robot = replace(suspended_robot(4), tension=TensionLimits(10.0, 2000.0, 100.0))
+    x, y, z = robot.platform.start
+    path = Line((x, y, z), (x + 0.3, y + 0.2, z + 0.2), 2.0)
+    near = [np.array([x, y, z]) + share * np.array([0.3, 0.2, 0.2]) for share in (0.005, 0.007)]
+    tensions = [static_equilibrium(robot, position).tensions for position in near]
+    assert np.max(np.abs(tensions[1] - tensions[0])) > 50.0
+    times = np.linspace(0.0, 2.0, 2001)
+    poses = sample_poses("test", robot, pose_path(robot, path), times)
+    # It turns by 0.07 rad in 2 s: smoothly, as the line rises, by at most 5.8 / 4 of that.
+    assert np.max(np.abs(poses.acceleration[:, 3:])) < 0.3
+    for index in (0, 500, 1000, 2000):
+        expected = np.array(static_equilibrium(robot, poses.position[index]).orientation)
+        assert poses.orientation[index] == pytest.approx(expected, abs=5e-5)
 
 
 def test_a_turn_that_too_few_cables_cannot_hold_is_refused_with_the_nearest_one() -> None:

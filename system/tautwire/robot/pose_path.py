@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 # Points of the orientation in equilibrium along a path, at first and at most; they are doubled until a quintic spline
 # through them, which is smooth in acceleration, meets those between them within a tolerance in rad.
 FIRST_POINTS, MAX_POINTS, SPLINE_DEGREE, SPLINE_TOLERANCE = 11, 641, 5, 1e-6
+# After so many doublings an error that does not fall below this share of the one before is that of a jump.
+SMOOTH_DOUBLINGS, JUMP_RATIO = 3, 0.75
 # rad: a path may turn this far from the orientation in equilibrium, as one rounded to three decimals does.
 MAX_EQUILIBRIUM_DEVIATION = 2e-3
 
@@ -125,16 +127,21 @@ def _equilibrium_orientations(robot: Robot, trajectory: Trajectory) -> Orientati
         return rotation_vectors_between(_equilibria_along(robot, trajectory, times), np.array(start))
 
     times = np.linspace(0.0, trajectory.duration, FIRST_POINTS)
-    vectors, is_exact = vectors_at(times), False
+    vectors, errors = vectors_at(times), [np.inf]
     spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
-    while not is_exact and len(times) < MAX_POINTS:
+    while errors[-1] > SPLINE_TOLERANCE and len(times) < MAX_POINTS and not _meets_a_jump(errors):
         middles = 0.5 * (times[1:] + times[:-1])
         between = vectors_at(middles)
-        is_exact = bool(np.max(np.abs(spline(middles) - between)) <= SPLINE_TOLERANCE)
+        errors.append(float(np.max(np.abs(spline(middles) - between))))
         indices = np.arange(1, len(times))
         times, vectors = np.insert(times, indices, middles), np.insert(vectors, indices, between, axis=0)
         spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
     return OrientationTrajectory(start, SplineTrajectory(spline, trajectory.duration))
+
+
+def _meets_a_jump(errors: list[float]) -> bool:
+    """Whether more points no longer help: a jump between two equilibria would only become steeper."""
+    return len(errors) > SMOOTH_DOUBLINGS and errors[-1] > JUMP_RATIO * errors[-2]
 
 
 def _equilibria_along(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
