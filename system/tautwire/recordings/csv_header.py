@@ -6,6 +6,7 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from io import BytesIO, TextIOWrapper
+from itertools import islice
 
 from ..errors import RecordingError
 from .clock_time import clock_format
@@ -107,31 +108,37 @@ def _find_header(lines: Sequence[str], known: Mapping[str, str], file: str) -> C
 
     Where there is none, it is the line that names most of the known columns, not certain to be a header.
     """
-    guesses: list[CsvHeader] = []
-    comments: list[CsvHeader] = []
-    certain: list[CsvHeader] = []
-    sampled = {sample.separator: sample.count for sample in first_samples(lines)[:MAX_FIRST_SAMPLES]}
-    for index, line in enumerate(lines):
-        if not line.strip():
-            continue
-        header = _as_header(index, line, known, sampled)
-        if header.is_certain:
-            (comments if header.is_comment else certain).append(header)
-        guesses.append(header)
+    sampled = {sample.separator: sample.count for sample in islice(first_samples(lines), MAX_FIRST_SAMPLES)}
+    rows = [(index, line) for index, line in enumerate(lines) if line.strip()]
+    named = [_as_header(index, line, known, sampled) for index, line in rows if _may_name_time(line, known)]
+    certain = [header for header in named if header.is_certain and not header.is_comment]
     if certain:
         return max(certain, key=lambda header: header.known_count)
+    comments = [header for header in named if header.is_certain]
     if len(comments) > 1:
         problem = f"names the columns, and so does line {comments[1].index + 1}"
         raise RecordingError(f"{file}: line {comments[0].index + 1}", problem, "keep one of the two")
-    if not comments + guesses:
+    if not rows:
         raise RecordingError(file, f"has {len(lines)} blank lines and no header", "begin with the names of the columns")
     if comments:
         return comments[0]
-    above = [names.index for sample in first_samples(lines)[:1] if (names := names_above(lines, sample, known))]
+    guesses = [_as_header(index, line, known, sampled) for index, line in rows]
+    samples = islice(first_samples(lines), 1)
+    above = [names.index for sample in samples if (names := names_above(lines, sample, known))]
     # As ROS writes it, names above samples may stand behind the mark of a comment.
     return max(
         guesses, key=lambda each: (not each.is_comment or each.index in above, each.known_count, each.index in above)
     )
+
+
+def _may_name_time(line: str, known: Mapping[str, str]) -> bool:
+    """Whether a cell of a line may be ``time``: its characters are there, but for quotation marks and spaces."""
+    text = _bare(line)
+    return any(_bare(name) in text for name, standard in known.items() if standard == "time")
+
+
+def _bare(text: str) -> str:
+    return "".join(text.split()).replace('"', "")
 
 
 def _as_header(index: int, line: str, known: Mapping[str, str], sampled: Mapping[str, int]) -> CsvHeader:

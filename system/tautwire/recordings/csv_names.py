@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections import Counter
-from collections.abc import Container, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 
 from .clock_time import clock_format
 from .csv_lines import SEPARATORS, is_comment, is_number, split_cells, without_comment_mark
@@ -31,26 +32,38 @@ class NamesLine:
     names: tuple[str, ...]
 
 
-def first_samples(lines: Sequence[str]) -> list[FirstSample]:
+def first_samples(lines: Sequence[str]) -> Iterator[FirstSample]:
     """Lines that may be the first of samples, numbers of two or more columns, by each separator that makes them so.
 
     Where every line has a text, as in a column of states, those whose numbers are in the same columns as in the next.
     """
     rows = [(index, line) for index, line in enumerate(lines) if line.strip() and not is_comment(line)]
-    of_numbers, beside_text = [], []
-    for number, (index, line) in enumerate(rows):
+    of_numbers = _samples_of_numbers(rows)
+    first = next(of_numbers, None)
+    if first is None:
+        yield from _samples_beside_text(rows)
+    else:
+        yield first
+        yield from of_numbers
+
+
+def _samples_of_numbers(rows: Sequence[tuple[int, str]]) -> Iterator[FirstSample]:
+    for index, line in rows:
+        for separator in SEPARATORS:
+            cells = split_cells(line, separator)
+            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
+                yield FirstSample(index, separator, len(cells))
+
+
+def _samples_beside_text(rows: Sequence[tuple[int, str]]) -> Iterator[FirstSample]:
+    for (index, line), (_, next_line) in pairwise(rows):
         for separator in SEPARATORS:
             cells = split_cells(line, separator)
             if len(cells) < 2 or not cells[0]:
                 continue
-            are_samples = [_is_sample(cell) for cell in cells]
-            if all(are_samples):
-                of_numbers.append(FirstSample(index, separator, len(cells)))
-            elif sum(are_samples) > 1 and number + 1 < len(rows):
-                next_cells = split_cells(rows[number + 1][1], separator)
-                if [_is_sample(cell) for cell in next_cells] == are_samples:
-                    beside_text.append(FirstSample(index, separator, len(cells)))
-    return of_numbers or beside_text
+            are_samples = list(map(_is_sample, cells))
+            if sum(are_samples) > 1 and list(map(_is_sample, split_cells(next_line, separator))) == are_samples:
+                yield FirstSample(index, separator, len(cells))
 
 
 def _is_sample(cell: str) -> bool:

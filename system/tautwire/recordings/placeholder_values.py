@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +77,7 @@ def _placeholder_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
         return none
     limit = MIN_JUMP_RATIO * float(np.quantile(moving, STEP_QUANTILE))
     edges = np.concatenate([[0], np.flatnonzero(steps != 0.0) + 1, [len(values)]])
-    runs = [(first, last) for first, last in pairwise(edges) if _is_between_jumps(steps, first, last, limit)]
+    runs = _runs_between_jumps(edges, steps > limit)
     counts = Counter(tuple(values[first]) for first, _ in runs)
     runs = [run for run in runs if run[1] - run[0] >= MIN_REPEATS or counts[tuple(values[run[0]])] >= MIN_REPEATS]
     if not runs:
@@ -88,11 +87,11 @@ def _placeholder_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
     return rows if np.mean(rows) <= MAX_SHARE else none
 
 
-def _is_between_jumps(steps: Array, first: int, last: int, limit: float) -> bool:
-    """Whether a run of rows begins and ends with a jump, or with the recording, and does not span it."""
-    before = steps[first - 1] > limit if first > 0 else True
-    after = steps[last - 1] > limit if last <= len(steps) else True
-    return bool(before and after and (first > 0 or last <= len(steps)))
+def _runs_between_jumps(edges: NDArray[np.int64], is_jump: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Runs of rows between edges (M,) that begin and end with a jump (N - 1,), or with the recording."""
+    is_end = np.concatenate([[True], is_jump, [True]])[edges]
+    found = np.flatnonzero(is_end[:-1] & is_end[1:])
+    return [(int(edges[run]), int(edges[run + 1])) for run in found]
 
 
 def _is_of_one_sensor(name: str, column: Array, rows: NDArray[np.bool_]) -> bool:
