@@ -5,12 +5,14 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import zipfile
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tautwire.errors import ArgumentError
-from tautwire.fmus.native import native_archive
+from tautwire.fmus.native import c_toolchain, native_archive
 from tautwire.fmus.native.c_toolchain import (
     PLATFORMS,
     THIS_PLATFORM,
@@ -19,7 +21,9 @@ from tautwire.fmus.native.c_toolchain import (
     compile_library,
     target_platforms,
 )
+from tautwire.fmus.native.component_sources import EQUATIONS_FILE
 from tautwire.fmus.packaging import build_fmus
+from tautwire.machine_code_cache import CACHE_VARIABLE
 from tests.support.effect_cases import CASES
 from tests.support.effects import with_effects
 from tests.support.native import both_runs, largest_difference
@@ -48,6 +52,22 @@ def test_what_a_compiler_refuses_is_told_in_one_line() -> None:
     with pytest.raises(NativeBuildError, match=r"cannot compile.*error") as caught:
         compile_library(sources, platform, SYSTEM_COMPILER)
     assert "\n" not in str(caught.value)
+
+
+def test_cables_that_differ_in_numbers_alone_are_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled = []
+
+    def run(command: Sequence[str], sources: Mapping[str, Any], *_: str) -> bytes:
+        if "-c" in command:
+            compiled.append(sources[EQUATIONS_FILE])
+        return b"machine code"
+
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr(c_toolchain, "_run", run)
+    monkeypatch.setattr(native_archive, "find_toolchain", lambda: SYSTEM_COMPILER)
+    cable, other = build_fmus(example("three"), tmp_path / "fmus", native=True).cables[1:]
+    assert len({fmu.read_bytes() for fmu in (cable, other)}) == 2
+    assert len(compiled) == 2 and compiled[0] != compiled[1]
 
 
 @pytest.mark.validate

@@ -21,10 +21,11 @@ import fmpy
 from ...errors import ArgumentError, ToolchainError
 from ...machine_code_cache import cached_machine_code
 from ..c_hosts import CHostError, find_compiler
-from .component_sources import CODE_FILE, START_FILE
+from .component_sources import CODE_FILE, ENTRY_FILE, START_FILE
 
-# No contraction to fused operations, so that all compilers round alike; nothing visible but the functions of FMI.
-COMPILER_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-w")
+# No contraction to fused operations, so that all compilers round alike; nothing visible but the functions of FMI. Zig
+# would add debug information by itself, which linking strips.
+COMPILER_FLAGS = ("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-w")
 # The FMI standard's own header files, as fmpy has them.
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 ZIG_HINT = 'pip install "tautwire[native]"'
@@ -118,7 +119,7 @@ def compile_library(sources: Mapping[str, str], platform: TargetPlatform, toolch
     where the compiler refuses.
     """
     command = toolchain.command_for(platform)
-    shared = {name: text for name, text in sources.items() if name != START_FILE}
+    shared = {name: text for name, text in sources.items() if name not in (START_FILE, ENTRY_FILE)}
     runtime = _windows_runtime() if platform.is_windows else {}
     origin = [toolchain.version, command, COMPILER_FLAGS, platform.link_flags, runtime]
 

@@ -47,6 +47,9 @@ RATE_NAMES = {
     "speed_command": "speed_command_rate",
 }
 VALUES_A_LINE = 5
+START_DECLARATIONS = (
+    "extern const char model_guid[];\nextern const double model_start[], model_constants[], model_nominals[];"
+)
 
 
 @dataclass(frozen=True)
@@ -220,7 +223,6 @@ def _structure(slave: Slave, component: _Component, further: Sequence[Variable])
             _numbers("minima", [_bound(each.minimum, -LARGEST_NUMBER) for each in parameters]),
             _numbers("maxima", [_bound(each.maximum, LARGEST_NUMBER) for each in parameters]),
             _numbers("state_scales", component.state_scales or unused_scale),
-            _numbers("state_nominals", [each.nominal or 1.0 for each in variables[slave.states]]),
             _numbers("stage_times", integration.STAGE_TIMES),
             _numbers("solution_weights", integration.SOLUTION_WEIGHTS),
             _numbers("error_weights", integration.ERROR_WEIGHTS),
@@ -266,22 +268,20 @@ def _code(component: _Component, fmi: int) -> str:
     common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h", DELAY_FILE)
     inside, behind = ((), ()) if component.indicator_count is None else ((each,) for each in MODEL_EXCHANGE_FILES[fmi])
     names = (*common, *component.c_files, *SLAVE_FILES, *inside, f"fmi{fmi}.c", *behind)
-    declarations = (
-        "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n"
-        "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif\n"
-    )
+    declarations = f"#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n{START_DECLARATIONS}\n#endif\n"
     return declarations + "".join(f'#include "{name}"\n' for name in names)
 
 
 def _start_values(slave: Slave, component: _Component, guid: str) -> str:
+    nominals = [variable.nominal or 1.0 for variable in slave.variables[slave.states]]
     return "\n".join(
         [
             "/* Written by Tautwire: the start values of this component. */",
-            "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE\n"
-            "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif",
+            f"#ifndef MODEL_SCOPE\n#define MODEL_SCOPE\n{START_DECLARATIONS}\n#endif",
             f'MODEL_SCOPE const char model_guid[] = "{guid}";',
             _numbers("model_start", slave.real, "MODEL_SCOPE"),
             _numbers("model_constants", component.constants or [0.0], "MODEL_SCOPE"),
+            _numbers("model_nominals", nominals or [1.0], "MODEL_SCOPE"),
             "",
         ]
     )

@@ -34,7 +34,7 @@ static int get_states(Slave *slave, double *states) {
 
 static int get_nominals(Slave *slave, double *nominals) {
   (void)slave;
-  memcpy(nominals, state_nominals, sizeof state_nominals);
+  memcpy(nominals, model_nominals, STATE_COUNT * sizeof(double));
   return STATUS_OK;
 }
 
