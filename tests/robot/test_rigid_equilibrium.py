@@ -10,6 +10,7 @@ from scipy.optimize import linprog, minimize
 from scipy.spatial.transform import Rotation
 
 from tautwire.errors import UnreachableError
+from tautwire.robot import rigid_equilibrium
 from tautwire.robot.cable_routes import attachment_points
 from tautwire.robot.kinematics import structure_matrix
 from tautwire.robot.rigid_equilibrium import load_wrench, static_equilibrium
@@ -89,6 +90,15 @@ def test_fewer_cables_turn_the_platform_into_the_nearest_equilibrium(count: int)
         options={"ftol": 1e-12, "maxiter": 60},
     )
     assert np.linalg.norm(nearest.x[:3]) == pytest.approx(equilibrium.moved_by, rel=1e-4)
+
+
+def test_the_same_robot_is_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, searches = shifted(suspended_robot(3), (0.021, 0.013, -0.1)), []
+    search = rigid_equilibrium._searched
+    monkeypatch.setattr(rigid_equilibrium, "_searched", lambda *given: searches.append(given) or search(*given))
+    orientation, tensions = start_orientation(robot), static_tensions(robot)
+    assert len(searches) == 1
+    assert np.allclose(imbalance(robot, orientation, tensions), 0.0, atol=2e-6)
 
 
 def test_with_three_cables_it_is_where_the_potential_energy_cannot_fall() -> None:

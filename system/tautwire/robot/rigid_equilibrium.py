@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from ..errors import ArgumentError, UnreachableError
 from .active_effects import cable_effects, cables_have_weight, centre_of_mass
 from .cable_routes import attachment_points, cable_routes, unreachable_error
 from .kinematics import structure_matrix_at, turned_orientation, validated_pose
-from .schema import Quaternion, Robot, TensionLimits
+from .schema import Point, Quaternion, Robot, TensionLimits
 from .static_load import fixed_point, static_load
 from .tension_distribution import BOUNDED_RULES, DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
 
@@ -85,7 +86,7 @@ def static_equilibrium(
     if robot.cable_count >= FREEDOMS or _is_balanced(*_balance(robot, at, declared, None)):
         rotation_vector = np.zeros(3)
     else:
-        rotation_vector = _nearest_orientation(robot, at)
+        rotation_vector = np.array(_nearest_orientation(robot, tuple(at.tolist())))
     turned = turned_orientation(declared, rotation_vector)
     tensions = _tensions(robot, at, turned, rule)
     matrix, load = _balance(robot, at, turned, tensions)
@@ -205,11 +206,16 @@ def _limit_error(robot: Robot, position: Array, matrix: Array, load: Array, limi
     return unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
 
 
-def _nearest_orientation(robot: Robot, position: Array) -> Array:
-    """Rotation vector, in rad, from the declared orientation to the nearest one in equilibrium.
+# The components of a robot, and those who note how it starts, ask for the same one.
+@lru_cache(maxsize=32)
+def _nearest_orientation(robot: Robot, at: Point) -> Point:
+    """Rotation vector, in rad, from the declared orientation to the nearest one in equilibrium at a position in m."""
+    x, y, z = _nearest_rotation(robot, np.array(at)).tolist()
+    return x, y, z
 
-    ``min |r|^2`` with ``A(r) T = w(r)`` and ``T >= 0``, the tensions in shares of the load.
-    """
+
+def _nearest_rotation(robot: Robot, position: Array) -> Array:
+    """Rotation vector of ``min |r|^2`` with ``A(r) T = w(r)`` and ``T >= 0``, the tensions in shares of the load."""
     load = float(np.linalg.norm(static_load(REAL, robot, position.tolist())))
 
     def imbalance(variables: Array) -> Array:
