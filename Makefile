@@ -18,7 +18,8 @@ FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_inp
 	recordings/test_csv_file recordings/test_mat_file recordings/test_mdf_file recordings/test_parquet_file \
 	recordings/test_ros_bag reports/test_trace_report_page robot/test_static_equilibrium))
 
-.PHONY: run test validate lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
+.PHONY: run test tests-in-minutes validate lint types docs pictures floors \
+	bench bench-long bench-trace bench-control bench-campaign clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
@@ -27,9 +28,13 @@ run: $(READY)
 unexport PYTHONDONTWRITEBYTECODE
 
 # Two workers on two cores: threads of BLAS would wait for each other.
-test validate floors: export OPENBLAS_NUM_THREADS = 1
+test tests-in-minutes validate floors: export OPENBLAS_NUM_THREADS = 1
 
-test: lint types
+# The type checker has one process, and would leave the other core idle.
+test: lint
+	$(MAKE) --no-print-directory --jobs 2 types tests-in-minutes
+
+tests-in-minutes: $(READY)
 	$(BIN)/$(PYTEST) -m "not validate" -W error::RuntimeWarning
 
 validate: $(READY)
