@@ -33,7 +33,7 @@ from .placeholder_values import without_placeholders
 from .quaternion_columns import are_valid, unit_quaternions
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 from .ros_bag import is_bag, open_bag
-from .winch_gaps import bridge_winch_gaps, long_gap_error
+from .winch_gaps import WINCH_COLUMNS, bridge_winch_gaps, long_gap_error
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 
@@ -266,15 +266,29 @@ def _winch_speeds(numbers: Mapping[str, NDArray[np.float64]], cables: Iterable[i
 def recording_errors(
     path: str | Path, cable_count: int, columns: Sequence[RecordedColumn] = ()
 ) -> Iterator[RecordingError]:
-    """All errors of a recording, in the file's order; none where it is valid. Slow: every cell is parsed.
+    """All errors of a recording, in the file's order; none where it is valid. Slow if not: every cell is parsed.
 
     Raises RecordingError where the file cannot be read as a recording at all.
     """
     header_errors: list[RecordingError] = []
     table, _ = _open_table(path, column_map(columns, cable_count), header_errors.append)
     yield from header_errors
-    if table.header.known_names:
+    if table.header.known_names and not _is_complete(table.numbers()):
         yield from row_errors(table.rows(), table.header, table.file)
+
+
+def _is_complete(numbers: Mapping[str, NDArray[np.float64]] | None) -> bool:
+    """Whether no cell of a table has an error; not where one of a winch is empty, of which some are bridged."""
+    if not numbers or "time" not in numbers or len(numbers["time"]) < 2:
+        return False
+    quaternion = [numbers[name] for name in QUATERNION_COLUMNS if name in numbers]
+    inputs = [values for name, values in numbers.items() if name == "time" or name.startswith(WINCH_COLUMNS)]
+    return bool(
+        all(np.isfinite(values).all() for values in inputs)
+        and not any((np.abs(values) > MAX_MAGNITUDE).any() for values in numbers.values())
+        and (np.diff(numbers["time"]) > 0.0).all()
+        and (len(quaternion) < len(QUATERNION_COLUMNS) or are_valid(np.column_stack(quaternion)))
+    )
 
 
 def _open_table(
