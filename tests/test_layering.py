@@ -16,6 +16,7 @@ FILES = (
     "input_files",
     "json_document",
     "machine_code_cache",
+    "memoisation",
     "name_suggestions",
     "number_format",
     "process_signals",

@@ -215,11 +215,11 @@ def test_position_that_is_none_is_refused() -> None:
         linearise(symmetric_robot(), (0.0, float("nan"), 0.0))
 
 
-def branch(rate) -> Effect:  # type: ignore[no-untyped-def]
+def branch(name: str, rate) -> Effect:  # type: ignore[no-untyped-def]
     """A made-up effect with one state that adds stiffness, for the treatment of states."""
     parameter = Parameter("damping", "s", "time of the branch", 0.0, 1e3, None, 1.0)
     return Effect(
-        name="branch",
+        name=name,
         component="cable",
         description="for this test only",
         parameters=(parameter,),
@@ -231,13 +231,13 @@ def branch(rate) -> Effect:  # type: ignore[no-untyped-def]
     )
 
 
-def with_branch(monkeypatch: pytest.MonkeyPatch, rate) -> Robot:  # type: ignore[no-untyped-def]
-    monkeypatch.setitem(BY_NAME, "branch", branch(rate))
-    return symmetric_robot().with_effect(EffectSetting("branch", {"damping": 0.5}, (1, 2, 3)))
+def with_branch(monkeypatch: pytest.MonkeyPatch, name: str, rate) -> Robot:  # type: ignore[no-untyped-def]
+    monkeypatch.setitem(BY_NAME, name, branch(name, rate))
+    return symmetric_robot().with_effect(EffectSetting(name, {"damping": 0.5}, (1, 2, 3)))
 
 
 def test_states_of_effects_have_settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = with_branch(monkeypatch, lambda m, v, s, cable, motion: ((motion.strain - s[0]) / v.damping,))
+    robot = with_branch(monkeypatch, "branch", lambda m, v, s, cable, motion: ((motion.strain - s[0]) / v.damping,))
     plant = linearise(robot, (0.8, 0.3, -0.4))
     plain = linearise(symmetric_robot(), (0.8, 0.3, -0.4))
     assert plant.system.state_labels[9:] == [f"branch_inner_{i}" for i in (1, 2, 3)]
@@ -248,7 +248,7 @@ def test_states_of_effects_have_settled(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_effect_that_never_settles_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot = with_branch(monkeypatch, lambda m, v, s, cable, motion: (1.0 + 0.0 * motion.strain,))
+    robot = with_branch(monkeypatch, "drift", lambda m, v, s, cable, motion: (1.0 + 0.0 * motion.strain,))
     with pytest.raises(OperatingPointError, match="never converge"):
         linearise(robot)
 

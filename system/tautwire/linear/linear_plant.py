@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from ..errors import InputError
+from ..memoisation import memoised
 from ..robot.kinematics import validated_pose
 from ..robot.rigid_equilibrium import static_equilibrium
 from ..robot.schema import Quaternion, Robot, validate_robot
@@ -86,9 +87,9 @@ def linearise(
     validate_robot("linearise: robot", robot)
     validate_number("linearise: swing", swing, SWING_RULE)
     pose, tensions, tolerance = _pose_at_rest(robot, requested_position(robot, at), orientation)
-    model = freeze_drifting_states(symbolic_model(robot, reference_orientation=pose.orientation))
+    model, derivatives = _model_and_derivatives(robot, pose.orientation)
     state = equilibrium_state(model, pose, tensions, tolerance)
-    A, B, C, D, tension_jacobian = _jacobians(model, state)
+    A, B, C, D, tension_jacobian = _jacobians(derivatives, model, state)
     tension_slopes = tension_jacobian[:, model.indices.pose]
     modes = modes_of(pose, model.indices, tensions, tension_slopes, A, B)
     operating_point = OperatingPoint(robot, model, state, tensions, tension_slopes)
@@ -133,13 +134,21 @@ def signal_names(names: Sequence[str]) -> list[str]:
     return [name.replace(".", "_") for name in names]
 
 
-def _jacobians(model: SymbolicModel, state: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """A, B, C, D, and the Jacobian of the span tensions by the states."""
+# Modes along a path and gains at its knots are of one model.
+@memoised(max_results=4)
+def _model_and_derivatives(robot: Robot, orientation: Quaternion) -> tuple[SymbolicModel, casadi.Function]:
+    """The model at an orientation, and the derivatives of :func:`_jacobians` as functions of states and inputs."""
+    model = freeze_drifting_states(symbolic_model(robot, reference_orientation=orientation))
     pairs = [(f, x) for f in (model.rates, model.outputs) for x in (model.states, model.inputs)]
     pairs.append((model.span_tensions, model.states))
-    derivatives = casadi.Function(
-        "derivatives", [model.states, model.inputs], [casadi.jacobian(f, x) for f, x in pairs]
-    )
+    jacobians = [casadi.jacobian(f, x) for f, x in pairs]
+    return model, casadi.Function("derivatives", [model.states, model.inputs], jacobians)
+
+
+def _jacobians(
+    derivatives: casadi.Function, model: SymbolicModel, state: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """A, B, C, D, and the Jacobian of the span tensions by the states."""
     values = derivatives(state, np.zeros(model.inputs.numel()))
     a, b, c, d, tension_jacobian = (np.asarray(value, dtype=float) for value in values)
     return a, b, c, d, tension_jacobian

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rotation import rotate
 
 from ..errors import ArgumentError, UnreachableError
+from ..memoisation import memoised
 from .active_effects import cable_effects, cables_have_weight, centre_of_mass
 from .cable_routes import attachment_points, cable_routes, unreachable_error
 from .kinematics import structure_matrix_at, turned_orientation, validated_pose
@@ -207,7 +207,7 @@ def _limit_error(robot: Robot, position: Array, matrix: Array, load: Array, limi
 
 
 # The components of a robot, and those who note how it starts, ask for the same one.
-@lru_cache(maxsize=32)
+@memoised(max_results=32)
 def _nearest_orientation(robot: Robot, at: Point) -> Point:
     """Rotation vector, in rad, from the declared orientation to the nearest one in equilibrium at a position in m."""
     x, y, z = _nearest_rotation(robot, np.array(at)).tolist()
