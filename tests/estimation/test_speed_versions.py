@@ -97,6 +97,7 @@ def test_speeds_taken_from_an_encoder_stay_so() -> None:
     assert split_with_other_interpolation(taken) is None
 
 
+@pytest.mark.validate
 def test_speeds_are_cubic_where_that_is_far_likelier_beside_a_disturbance() -> None:
     for is_smooth in (False, True):
         recordings = (shaken(is_smooth, seed, noise=PRECISE) for seed in (1, 2))

@@ -242,8 +242,10 @@ def _clock_readings(motion: _RecordedMotion) -> Iterator[tuple[WindingReading, f
         part = RopeMotion(centred(ropes.lengths[inside]), ropes.least_scale[inside])
         return part.misfit(centred(shifted), declared)
 
+    least, best = min((misfit(shift), float(shift)) for shift in np.linspace(-reach, reach, 401))
+    if abs(best) < MIN_CLOCK_OFFSET:
+        return
     # Of a periodic motion, a shift by whole periods fits as well as a small one.
     small = min(misfit(shift) for shift in np.linspace(-MIN_CLOCK_OFFSET, MIN_CLOCK_OFFSET, 101))
-    least, best = min((misfit(shift), float(shift)) for shift in np.linspace(-reach, reach, 401))
-    if abs(best) >= MIN_CLOCK_OFFSET and small > MIN_IMPROVEMENT * least + EQUAL_DIFFERENCE:
+    if small > MIN_IMPROVEMENT * least + EQUAL_DIFFERENCE:
         yield WindingReading(signs=declared.signs, order=declared.order, clock_offset=-best), least
