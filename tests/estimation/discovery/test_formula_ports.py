@@ -62,6 +62,7 @@ TERMS = (
 )
 
 
+@pytest.mark.validate(but=["plain", "force_z 1", "strain_rate"])
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: f"{term.target} {term.text}")
 @pytest.mark.parametrize(
     ("formulas", "noise"),

@@ -296,6 +296,7 @@ def test_by_fmi_3_there_are_those_with_respect_to_the_time(tmp_path: Path) -> No
     assert adjoint == pytest.approx(np.sum(expected), rel=EXACT)
 
 
+@pytest.mark.validate
 def test_what_a_lagging_sensor_shows_has_none_with_respect_to_the_time(fmus_of: Callable[..., RobotFmus]) -> None:
     with in_model_exchange(fmus_of("delayed", 3).cables[0]) as model:
         model.run()
