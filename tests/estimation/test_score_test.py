@@ -18,7 +18,7 @@ from tautwire.estimation.score_test import (
     _predicted_gain,
     effect_sensitivities,
     score_test,
-    score_test_in_workers,
+    score_tests_in_workers,
     statistics_of_runs,
 )
 from tautwire.estimation.worker_pool import WorkerPool
@@ -98,18 +98,21 @@ def test_a_column_of_all_cables_is_the_sum_of_those_of_each() -> None:
 
 
 @pytest.mark.validate
-def test_workers_compute_the_same_scores() -> None:
+def test_workers_compute_the_same_scores_by_all_densities_at_once() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
     robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
     others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
-    here = score_test(robot, accepted, others, Fitter(NOISE), SAMPLE)
+    densities = (0.0, 0.1)
+    here = [score_test(robot, accepted, others, Fitter(NOISE), SAMPLE, density) for density in densities]
     with WorkerPool(2) as workers:
         context = IdentificationContext(ROBOT, Fitter(NOISE), SPLIT, workers=workers)
-        apart = score_test_in_workers(context, robot, accepted, others, SAMPLE)
-    assert list(apart) == list(here)
-    for hypothesis, prospect in here.items():
-        assert apart[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
-        assert apart[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
+        apart = score_tests_in_workers(context, robot, accepted, others, SAMPLE, densities)
+    for found, expected in zip(apart, here, strict=True):
+        assert list(found) == list(expected)
+        for hypothesis, prospect in expected.items():
+            assert found[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
+            assert found[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
+    assert any(here[0][hypothesis].gain != here[1][hypothesis].gain for hypothesis in others)
 
 
 @pytest.mark.validate

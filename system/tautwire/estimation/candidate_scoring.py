@@ -20,7 +20,7 @@ from .disturbance_posterior import disturbance_prior
 from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
-from .score_test import PredictedGain, score_test_in_workers
+from .score_test import PredictedGain, score_tests_in_workers
 from .time_limit import OutOfTimeError
 
 Predictions = dict[Hypothesis, PredictedGain]
@@ -194,16 +194,15 @@ def _predict_gains(context: IdentificationContext, search_round: SearchRound) ->
     candidates = search_round.candidates(context.robot)
     # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
     data = context.split.estimation if search_round.is_white else context.head
-    predictions = score_test_in_workers(context, robot, accepted, candidates, data)
+    follows_measurements = not search_round.is_white and not context.fitter.has_disturbance
+    densities = (0.0, context.policy.score_test.rough_noise_density) if follows_measurements else (0.0,)
+    predictions, *rough_predictions = score_tests_in_workers(context, robot, accepted, candidates, data, densities)
     misleading = misleading_predictions(predictions, robot.cable_numbers)
     predictions |= grid_search(context, robot, accepted, data, misleading)
     if context.fitter.has_disturbance:
         prior = disturbance_prior(robot, context.fitter.noise, context.policy.fit.disturbance)
         under_median = replace(context, fitter=context.fitter.with_disturbance(prior.median))
-        others = score_test_in_workers(under_median, robot, accepted, candidates, context.head)
+        (others,) = score_tests_in_workers(under_median, robot, accepted, candidates, context.head, (0.0,))
         misleading = misleading_predictions(others, robot.cable_numbers)
         return predictions, others | grid_search(under_median, robot, accepted, context.head, misleading)
-    if search_round.is_white:
-        return predictions, {}
-    density = context.policy.score_test.rough_noise_density
-    return predictions, score_test_in_workers(context, robot, accepted, candidates, data, density)
+    return predictions, rough_predictions[0] if rough_predictions else {}

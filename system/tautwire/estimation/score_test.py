@@ -10,7 +10,7 @@ Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, s
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
@@ -69,35 +69,57 @@ def score_test(
     Far from noise the score misleads: an oscillation out of phase after a while asks for damping whatever it lacks.
     With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows the measurements, and the score is right.
     """
-    statistics = score_statistics(robot, accepted, candidates, fitter, data, acceleration_noise_density)
-    best: dict[Hypothesis, PredictedGain] = {}
-    for hypothesis in candidates:
-        grid = starting_grid(hypothesis.effect, robot, cables_of(hypothesis.effect, candidates))
-        trials = enumerate(grid[: grid_size(hypothesis)])
-        predictions = [_predicted_gain(statistics, accepted, hypothesis, number, shapes) for number, shapes in trials]
-        best[hypothesis] = max(predictions, key=lambda prospect: prospect.gain)
-    return best
+    (predictions,) = score_tests(robot, accepted, candidates, fitter, data, (acceleration_noise_density,))
+    return predictions
 
 
-def score_test_in_workers(
+def score_tests(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    candidates: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    acceleration_noise_densities: Sequence[float],
+) -> list[dict[Hypothesis, PredictedGain]]:
+    """As :func:`score_test`, by each density."""
+    statistics = _statistics_by_density(robot, accepted, candidates, fitter, data, acceleration_noise_densities)
+    return [
+        {hypothesis: _best_gain(each, robot, accepted, hypothesis, candidates) for hypothesis in candidates}
+        for each in statistics
+    ]
+
+
+def _best_gain(
+    statistics: ScoreStatistics,
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    hypothesis: Hypothesis,
+    candidates: Sequence[Hypothesis],
+) -> PredictedGain:
+    grid = starting_grid(hypothesis.effect, robot, cables_of(hypothesis.effect, candidates))
+    trials = enumerate(grid[: grid_size(hypothesis)])
+    predictions = [_predicted_gain(statistics, accepted, hypothesis, number, shapes) for number, shapes in trials]
+    return max(predictions, key=lambda prospect: prospect.gain)
+
+
+def score_tests_in_workers(
     context: IdentificationContext,
     robot: Robot,
     accepted: Sequence[Hypothesis],
     candidates: Sequence[Hypothesis],
     data: DataSet,
-    acceleration_noise_density: float = 0.0,
-) -> dict[Hypothesis, PredictedGain]:
-    """As :func:`score_test`, with the effects shared out to the worker processes."""
+    acceleration_noise_densities: Sequence[float],
+) -> list[dict[Hypothesis, PredictedGain]]:
+    """As :func:`score_tests`, with the effects shared out to the worker processes."""
     fitter, count = context.fitter, context.workers.processes
     effects = list(dict.fromkeys(hypothesis.effect for hypothesis in candidates))
     shares = [[h for h in candidates if h.effect in effects[number::count]] for number in range(count)]
-    calls = [(robot, accepted, own, fitter, data, acceleration_noise_density) for own in shares if own]
-    predictions = {
-        h: prospect
-        for _, prospects in context.workers.map_unordered(score_test, calls)
-        for h, prospect in prospects.items()
-    }
-    return {hypothesis: predictions[hypothesis] for hypothesis in candidates}
+    calls = [(robot, accepted, own, fitter, data, acceleration_noise_densities) for own in shares if own]
+    predictions: list[dict[Hypothesis, PredictedGain]] = [{} for _ in acceleration_noise_densities]
+    for _, results in context.workers.map_unordered(score_tests, calls):
+        for of_all, of_share in zip(predictions, results, strict=True):
+            of_all.update(of_share)
+    return [{hypothesis: each[hypothesis] for hypothesis in candidates} for each in predictions]
 
 
 def score_statistics(
@@ -106,19 +128,32 @@ def score_statistics(
     hypotheses: Sequence[Hypothesis],
     fitter: Fitter,
     data: DataSet,
-    acceleration_noise_density: float = 0.0,
 ) -> ScoreStatistics:
     """Score statistics of the accepted hypotheses' parameters, and of the others' on each cable alone.
 
     Those begin as the robot file declares them, or neutral.
     """
+    (statistics,) = _statistics_by_density(robot, accepted, hypotheses, fitter, data, (0.0,))
+    return statistics
+
+
+def _statistics_by_density(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    hypotheses: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    acceleration_noise_densities: Sequence[float],
+) -> Iterator[ScoreStatistics]:
+    """Score statistics by each density; what is compiled for the effects, which takes longest, serves all."""
     likelihood, values = fitter.likelihood(robot, accepted, data)
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
     effects = effect_sensitivities(data.placed(robot), hypotheses, likelihood.model.state_names)
-    runs = linearise_filter(likelihood, values, data.recording, acceleration_noise_density)
-    return statistics_of_runs(runs, effects, data.rows, columns, values)
+    for density in acceleration_noise_densities:
+        runs = linearise_filter(likelihood, values, data.recording, density)
+        yield statistics_of_runs(runs, effects, data.rows, columns, values)
 
 
 def statistics_of_runs(
