@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from math import pi, sqrt
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.errors import InputError, UnreachableError
-from tautwire.linear import OperatingPointError, linearise, model_document
+from tautwire.linear import OperatingPointError, linear_plant, linearise, model_document
 from tautwire.linear.modes import cable_energies
 from tautwire.linear.operating_point import Pose
 from tautwire.robot.pose_stiffness import stiffness_matrix
@@ -245,6 +246,15 @@ def test_states_of_effects_have_settled(monkeypatch: pytest.MonkeyPatch) -> None
     assert plant.state[9:] == pytest.approx(strains, rel=1e-6)
     assert plant.modes.frequencies[0] > 1.1 * plain.modes.frequencies[0]
     assert np.all(plant.modes.damping_ratios > 0.0)
+
+
+def test_the_model_is_assembled_once_for_all_positions(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, assembled = replace(symmetric_robot(), name="assembled once"), []
+    assemble = linear_plant.symbolic_model
+    monkeypatch.setattr(linear_plant, "symbolic_model", lambda *r, **o: assembled.append(r) or assemble(*r, **o))
+    here, there, again = (linearise(robot, (x, 0.3, -0.4)) for x in (0.8, -0.8, 0.8))
+    assert len(assembled) == 1
+    assert np.array_equal(here.system.A, again.system.A) and not np.allclose(here.system.A, there.system.A)
 
 
 def test_effect_that_never_settles_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
