@@ -13,7 +13,7 @@ from tautwire.robot.pose_path import pose_path, sample_poses
 from tautwire.robot.pose_trajectory import PoseTrajectory, slerp
 from tautwire.robot.rigid_equilibrium import static_equilibrium
 from tautwire.robot.schema import EffectSetting, Robot, TensionLimits
-from tautwire.robot.trajectory import Line, Trajectory
+from tautwire.robot.trajectory import Helix, Line, Trajectory
 from tautwire.robot.winch_speeds import ideal_winch_speeds
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 from tests.support.robots import example
@@ -85,6 +85,17 @@ def test_a_path_away_from_the_middle_of_a_ring_passes_smoothly_over_a_jump_of_th
     for index in (0, 500, 1000, 2000):
         expected = np.array(static_equilibrium(robot, poses.position[index]).orientation)
         assert poses.orientation[index] == pytest.approx(expected, abs=5e-5)
+
+
+@pytest.mark.validate
+def test_a_path_of_many_turns_follows_the_equilibria_between_its_points() -> None:
+    robot = suspended_robot(3)
+    path = Helix((0.0, 0.0, 1.5), 0.3, 0.0, 40.0 * np.pi, 60.0)
+    times = np.array([7.3, 21.9, 40.1])
+    poses = sample_poses("test", robot, pose_path(robot, path), times)
+    for position, orientation in zip(poses.position, poses.orientation, strict=True):
+        expected = np.array(static_equilibrium(robot, position).orientation)
+        assert orientation == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_turn_that_too_few_cables_cannot_hold_is_refused_with_the_nearest_one() -> None:

@@ -30,8 +30,9 @@ Array = NDArray[np.float64]
 # Points of the orientation in equilibrium along a path, at first and at most; they are doubled until a quintic spline
 # through them, which is smooth in acceleration, meets those between them within a tolerance in rad.
 FIRST_POINTS, MAX_POINTS, SPLINE_DEGREE, SPLINE_TOLERANCE = 11, 641, 5, 1e-6
-# After so many doublings an error that does not fall below this share of the one before is that of a jump.
-SMOOTH_DOUBLINGS, JUMP_RATIO = 3, 0.75
+# After so many doublings an error that does not fall below this share of the one before is that of a jump, where a
+# spline meets the positions, whose motion it has to follow first, within a share of their extent.
+SMOOTH_DOUBLINGS, JUMP_RATIO, RESOLVED_SHARE = 3, 0.75, 1e-3
 # rad: a path may turn this far from the orientation in equilibrium, as one rounded to three decimals does.
 MAX_EQUILIBRIUM_DEVIATION = 2e-3
 
@@ -127,21 +128,31 @@ def _equilibrium_orientations(robot: Robot, trajectory: Trajectory) -> Orientati
         return rotation_vectors_between(_equilibria_along(robot, trajectory, times), np.array(start))
 
     times = np.linspace(0.0, trajectory.duration, FIRST_POINTS)
-    vectors, errors = vectors_at(times), [np.inf]
+    vectors, error, errors = vectors_at(times), np.inf, list[float]()
     spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
-    while errors[-1] > SPLINE_TOLERANCE and len(times) < MAX_POINTS and not _meets_a_jump(errors):
+    while error > SPLINE_TOLERANCE and len(times) < MAX_POINTS and not _meets_a_jump(errors):
         middles = 0.5 * (times[1:] + times[:-1])
         between = vectors_at(middles)
-        errors.append(float(np.max(np.abs(spline(middles) - between))))
+        error = float(np.max(np.abs(spline(middles) - between)))
+        errors = [*errors, error] if _is_resolved(trajectory, times) else []
         indices = np.arange(1, len(times))
         times, vectors = np.insert(times, indices, middles), np.insert(vectors, indices, between, axis=0)
         spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
     return OrientationTrajectory(start, SplineTrajectory(spline, trajectory.duration))
 
 
+def _is_resolved(trajectory: Trajectory, times: Array) -> bool:
+    """Whether a spline through the positions at times (N,) meets those between them."""
+    positions, between = (
+        evaluate_path("pose_path", trajectory, "position", each) for each in (times, 0.5 * (times[1:] + times[:-1]))
+    )
+    errors = make_interp_spline(times, positions, SPLINE_DEGREE)(0.5 * (times[1:] + times[:-1])) - between
+    return bool(np.max(np.abs(errors)) <= RESOLVED_SHARE * np.max(np.ptp(positions, axis=0)))
+
+
 def _meets_a_jump(errors: list[float]) -> bool:
     """Whether more points no longer help: a jump between two equilibria would only become steeper."""
-    return len(errors) > SMOOTH_DOUBLINGS and errors[-1] > JUMP_RATIO * errors[-2]
+    return len(errors) >= SMOOTH_DOUBLINGS and errors[-1] > JUMP_RATIO * errors[-2]
 
 
 def _equilibria_along(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
