@@ -81,7 +81,7 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return (error,) if error else ()
     if error := unwound_motion_error(robot, recording):
         return (error,)
-    # Where no winch turns, what moves the platform is no matter of the columns.
+    # Else, where no winch turns, what moves the platform is no matter of the columns.
     motion = None if all_winches_stand(robot, recording) else check_motion(robot, recording)
     travel = None if _follows(motion) else _excessive_travel(robot, recording)
     errors = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
@@ -19,6 +20,8 @@ ROWS_USED, MIN_ROWS, INLIER_QUANTILE = 1000, 10, 0.95
 MIN_STRETCH_RATIO, MIN_LOAD_RATIO, MIN_NOISE_RATIO = 20.0, 8.0, 20.0
 MIN_TAUT_SHARE = 0.2
 MIN_LENGTH_SHARE = 0.003  # of a rope, which a survey and pulleys may be off by where the platform swings
+# Rows of a median, in which outliers of a tracker are left out.
+OUTLIER_ROWS = 5
 # Share of the lengths' range that ropes get back; correlation of each length with its tension, where ropes are softer.
 MIN_RETURN, MIN_SOFT_CORRELATION = 0.3, 0.7
 
@@ -28,7 +31,8 @@ def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
 
     A taut rope on a winch that stands changes by ``L dT / (E A)``; all ropes have to change by far more, and where no
     tension was measured by far more than any load stretches them. A load that swings on one rope keeps the length of
-    that. It is no error: hands lift platforms, and ropes creep. None where a rigid platform's orientation is not known.
+    that. By itself it is no error: hands lift platforms, and ropes creep. None where the orientation of a rigid
+    platform is not known.
     """
     lengths = _unwound_lengths(robot, recording)
     if lengths is None:
@@ -41,16 +45,16 @@ def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
 
 
 def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError | None:
-    """The error of winches that stand throughout while ropes that are taut grow and shrink; None without one.
+    """The error of winch speeds that are all zero while ropes that are taut grow and shrink; None without one.
 
     Hands that lift a platform let ropes hang, creep gives nothing back, and ropes that are softer than declared follow
-    their tension: none of these is an error.
+    their tension: none of these is an error, and speeds within their noise are none.
     """
     lengths, rows = _unwound_lengths(robot, recording), _complete_rows(robot, recording)
-    if lengths is None or rows is None:
+    if recording.winch_speed.any() or lengths is None or rows is None:
         return None
     measured = np.isfinite(recording.tension[rows]).all(axis=1)
-    lengths, tension = lengths[measured], recording.tension[rows[measured]]
+    lengths, tension = median_filter(lengths[measured], (OUTLIER_ROWS, 1)), recording.tension[rows[measured]]
     if len(tension) < MIN_ROWS or not all(_is_taut(column) for column in tension.T):
         return None
     returned = np.maximum.accumulate(lengths, axis=0) - lengths
