@@ -17,6 +17,8 @@ RELATIVE_RESOLUTION = 1e-7
 # whole steps within a fraction. Of differences of any size two in five would be; smaller ones are rounding errors.
 SMALLEST_DIFFERENCE = 1e-9
 STEP_QUANTILE, MIN_WHOLE_SHARE, MAX_FRACTION = 0.05, 0.9, 0.2
+# One event leaves up to four of them, multiples of its size.
+MIN_DIFFERENCES = 20
 
 
 def white_noise_deviation(samples: Array) -> float:
@@ -51,7 +53,7 @@ def quantization_step(signal: Array) -> float:
     """
     differences = np.abs(np.diff(signal[np.isfinite(signal)], 3))
     differences = differences[differences > SMALLEST_DIFFERENCE]
-    if not len(differences):
+    if len(differences) < MIN_DIFFERENCES:
         return 0.0
     step = float(np.quantile(differences, STEP_QUANTILE))
     multiples = differences / step
