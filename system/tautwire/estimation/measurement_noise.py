@@ -149,7 +149,7 @@ def check_noise(
 
     A floor 1.5 times the declared standard deviation or more, or less than 1 / 1.5 of it, replaces the declared one.
     Where the spectrum falls to its end below the declared level, the noise is coloured, and a disturbance has to be
-    estimated. Winch speeds may be declared noisier than they are.
+    estimated, as where too few digits were recorded. Winch speeds may be declared noisier than they are.
     """
     checked = CheckedNoise(noise)
     positions, tensions = range(3), range(3, 3 + robot.cable_count)
@@ -174,7 +174,8 @@ def _check_digits(
     checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
 ) -> CheckedNoise:
     """Take no noise for less than what rounding adds, step / sqrt(12), which has a memory where motion is slow."""
-    is_coloured, deviations = checked.is_coloured, list(checked.noise.of_outputs(recordings[0].cable_count))
+    count = recordings[0].cable_count
+    is_coloured, deviations = checked.is_coloured, list(checked.noise.of_outputs(count))
     outputs_by_finding: dict[str, list[str]] = {}
     for column in columns:
         step = max(quantization_step(_signal(recording, column)) for recording in recordings)
@@ -185,7 +186,7 @@ def _check_digits(
                 f"values are in steps of {step:.3g} {unit}, where noise of {declared:.3g} {unit} is declared: record "
                 f"more digits; {rounding:.3g} {unit} is used, and its memory is estimated with the disturbance"
             )
-            outputs_by_finding.setdefault(finding, []).append(output_names(recordings[0].cable_count, True)[column])
+            outputs_by_finding.setdefault(finding, []).append(output_names(count, is_rigid=True)[column])
     return _with_findings(replace(checked, is_coloured=is_coloured), deviations, outputs_by_finding)
 
 
@@ -214,9 +215,9 @@ def _check_sensor_kind(
         return checked
     flat = is_flat(list(levels.values()), policy.max_band_ratio)
     for column, level in levels.items():
-        name = output_names(recordings[0].cable_count, is_rigid=True)[column]
         floor = float(np.sqrt(np.mean(level) if flat else np.min(level)))
-        if declared[column] > stated[column] and floor <= declared[column] * policy.max_noise_ratio:
+        is_rounding = declared[column] > stated[column]
+        if is_rounding and floor <= declared[column] * policy.max_noise_ratio:
             continue
         if not flat and floor < declared[column] / policy.min_colour_ratio:
             standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
@@ -240,7 +241,7 @@ def _check_sensor_kind(
                 f"the spectrum is above the declared noise, {declared[column]:.3g} {unit}, and has no floor: either "
                 "the noise is larger and coloured, or the sampling misses fast motion; the declared noise is used"
             )
-        outputs_by_finding.setdefault(finding, []).append(name)
+        outputs_by_finding.setdefault(finding, []).append(output_names(count, is_rigid=True)[column])
     return _with_findings(replace(checked, is_coloured=is_coloured), deviations, outputs_by_finding)
 
 

@@ -14,6 +14,7 @@ from .standing_winches import all_winches_stand
 from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 ROWS_USED, MIN_ROWS, INLIER_QUANTILE = 1000, 10, 0.95
 # Rms of lengths to that of what tension stretches ropes by; to what the load does, where none was measured; to noise.
@@ -34,11 +35,12 @@ def unwound_motion_text(robot: Robot, recording: Recording) -> str | None:
     that. By itself it is no error: hands lift platforms, and ropes creep. None where the orientation of a rigid
     platform is not known.
     """
-    lengths = _unwound_lengths(robot, recording)
-    if lengths is None:
+    unwound = _unwound_lengths(robot, recording)
+    if unwound is None:
         return None
+    largest = float(np.ptp(unwound[1], axis=0).max())
     return (
-        f"all winches stand, and by the positions ropes change in length by up to {np.ptp(lengths, axis=0).max():.3g} "
+        f"all winches stand, and by the positions ropes change in length by up to {largest:.3g} "
         "m, far more than tension stretches them: the platform was held or lifted, ropes creep, or the columns of the "
         "winches are not of this motion"
     )
@@ -50,9 +52,10 @@ def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError |
     Hands that lift a platform let ropes hang, creep gives nothing back, and ropes that are softer than declared follow
     their tension: none of these is an error, and speeds within their noise are none.
     """
-    lengths, rows = _unwound_lengths(robot, recording), _complete_rows(robot, recording)
-    if recording.winch_speed.any() or lengths is None or rows is None:
+    unwound = None if recording.winch_speed.any() else _unwound_lengths(robot, recording)
+    if unwound is None:
         return None
+    rows, lengths = unwound
     measured = np.isfinite(recording.tension[rows]).all(axis=1)
     lengths, tension = median_filter(lengths[measured], (OUTLIER_ROWS, 1)), recording.tension[rows[measured]]
     if len(tension) < MIN_ROWS or not all(_is_taut(column) for column in tension.T):
@@ -73,8 +76,8 @@ def unwound_motion_error(robot: Robot, recording: Recording) -> RecordingError |
     )
 
 
-def _unwound_lengths(robot: Robot, recording: Recording) -> Array | None:
-    """Geometric lengths (M, n) that change by far more than winches that stand allow; None where they do not."""
+def _unwound_lengths(robot: Robot, recording: Recording) -> tuple[Rows, Array] | None:
+    """Rows (M,) and lengths (M, n) that change by far more than winches that stand allow; None where they do not."""
     rows = _complete_rows(robot, recording)
     if rows is None:
         return None
@@ -84,10 +87,10 @@ def _unwound_lengths(robot: Robot, recording: Recording) -> Array | None:
     noise = float(np.nan_to_num(white_noise_deviation(recording.position)))
     limits = np.maximum(_largest_changes(robot, recording.tension[rows], lengths), MIN_NOISE_RATIO * noise)
     limits = np.maximum(limits, MIN_LENGTH_SHARE * lengths.mean(axis=0))
-    return None if np.any(_deviations(lengths) <= limits) else lengths
+    return None if np.any(_deviations(lengths) <= limits) else (rows, lengths)
 
 
-def _complete_rows(robot: Robot, recording: Recording) -> NDArray[np.intp] | None:
+def _complete_rows(robot: Robot, recording: Recording) -> Rows | None:
     """Rows with a whole pose, (M,), while all winches stand; None where one turns, or poses are too few."""
     is_rigid = robot.platform.is_rigid_body
     if (

@@ -128,25 +128,24 @@ def _equilibrium_orientations(robot: Robot, trajectory: Trajectory) -> Orientati
         return rotation_vectors_between(_equilibria_along(robot, trajectory, times), np.array(start))
 
     times = np.linspace(0.0, trajectory.duration, FIRST_POINTS)
-    vectors, error, errors = vectors_at(times), np.inf, list[float]()
+    vectors, error = vectors_at(times), np.inf
+    errors: list[float] = []
     spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
     while error > SPLINE_TOLERANCE and len(times) < MAX_POINTS and not _meets_a_jump(errors):
         middles = 0.5 * (times[1:] + times[:-1])
         between = vectors_at(middles)
         error = float(np.max(np.abs(spline(middles) - between)))
-        errors = [*errors, error] if _is_resolved(trajectory, times) else []
+        errors = [*errors, error] if _is_resolved(trajectory, times, middles) else []
         indices = np.arange(1, len(times))
         times, vectors = np.insert(times, indices, middles), np.insert(vectors, indices, between, axis=0)
         spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
     return OrientationTrajectory(start, SplineTrajectory(spline, trajectory.duration))
 
 
-def _is_resolved(trajectory: Trajectory, times: Array) -> bool:
-    """Whether a spline through the positions at times (N,) meets those between them."""
-    positions, between = (
-        evaluate_path("pose_path", trajectory, "position", each) for each in (times, 0.5 * (times[1:] + times[:-1]))
-    )
-    errors = make_interp_spline(times, positions, SPLINE_DEGREE)(0.5 * (times[1:] + times[:-1])) - between
+def _is_resolved(trajectory: Trajectory, times: Array, middles: Array) -> bool:
+    """Whether a spline through the positions at times (N,) meets those at the times between them (N - 1,)."""
+    positions, between = (evaluate_path("pose_path", trajectory, "position", each) for each in (times, middles))
+    errors = make_interp_spline(times, positions, SPLINE_DEGREE)(middles) - between
     return bool(np.max(np.abs(errors)) <= RESOLVED_SHARE * np.max(np.ptp(positions, axis=0)))
 
 
