@@ -16,7 +16,7 @@ from tautwire.estimation.speed_versions import split_with_other_interpolation
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
 from tautwire.recordings.speed_interpolation import with_spline_speeds
-from tautwire.robot.schema import AXES
+from tautwire.robot.schema import AXES, Robot
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.rig.robot import Noise
 from tests.support.recordings import REACH
@@ -29,8 +29,9 @@ PRECISE = replace(NOISE, position=1e-6, tension=1e-2, winch_speed=1e-7)
 THREE = example("three")
 SURVEYED = replace(THREE, cables=tuple(replace(cable, anchor_uncertainty=1e-4) for cable in THREE.cables))
 
-PRECISELY_MEASURED = replace(
-    SURVEYED, sensors=replace(THREE.sensors, position_noise=1e-6, tension_noise=1e-2, winch_speed_noise=1e-7)
+PRECISELY_MEASURED, EXACT = (
+    replace(robot, sensors=replace(THREE.sensors, position_noise=1e-6, tension_noise=1e-2, winch_speed_noise=1e-7))
+    for robot in (SURVEYED, THREE)
 )
 
 
@@ -98,26 +99,28 @@ def test_speeds_taken_from_an_encoder_stay_so() -> None:
 
 
 @pytest.mark.validate
-def test_speeds_are_cubic_where_that_is_far_likelier_beside_a_disturbance() -> None:
+@pytest.mark.parametrize("robot", [PRECISELY_MEASURED, EXACT], ids=["beside a disturbance", "without one"])
+def test_speeds_are_cubic_where_that_is_far_likelier(robot: Robot) -> None:
     for is_smooth in (False, True):
         recordings = (shaken(is_smooth, seed, noise=PRECISE) for seed in (1, 2))
-        prepared, *_ = prepare_data(PRECISELY_MEASURED, *recordings, WorkerPool(1))
+        prepared, *_ = prepare_data(robot, *recordings, WorkerPool(1))
         is_cubic = prepared.split.estimation.recording.winch_acceleration is not None
         assert is_cubic == is_smooth
 
 
 @pytest.mark.validate
+@pytest.mark.parametrize("robot", [PRECISELY_MEASURED, EXACT], ids=["beside a disturbance", "without one"])
 @pytest.mark.parametrize("is_smooth", [True, False])
 def test_interpolation_is_judged_again_under_the_effects_found(
-    monkeypatch: pytest.MonkeyPatch, is_smooth: bool
+    monkeypatch: pytest.MonkeyPatch, is_smooth: bool, robot: Robot
 ) -> None:
     """It begins with the wrong one."""
     threshold = np.inf if is_smooth else -np.inf
-    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_cubic_gain=threshold)
+    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_cubic_gain=threshold, min_speed_gain_to_misfit=threshold)
     monkeypatch.setattr(
         identification, "policy_within", lambda seconds: replace(DEFAULT_POLICY, preprocessing=wrong_first)
     )
-    result = trace(PRECISELY_MEASURED, *(shaken(is_smooth, seed, damping=6e9, noise=PRECISE) for seed in (1, 2)))
+    result = trace(robot, *(shaken(is_smooth, seed, damping=6e9, noise=PRECISE) for seed in (1, 2)))
     assert [effect.name for effect in result.effects] == ["damping"]
     notes = [note for note in result.notes if "winch speeds are cubic between samples" in note]
     assert len(notes) == (2 if is_smooth else 0)

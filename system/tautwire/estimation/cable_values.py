@@ -18,14 +18,11 @@ from contextlib import suppress
 from dataclasses import replace
 from math import inf, log
 
-import numpy as np
-
 from ..errors import UnreachableError
 from .candidate_scores import setting_of
 from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, split_by_cable
 from .identification_context import IdentificationContext
-from .measured_outputs import measured_outputs
 from .parameter_fit import NoFitError
 from .selection_result import SelectionResult
 
@@ -81,7 +78,4 @@ def _with_values_of(
 
 
 def _schwarz_price(context: IdentificationContext, parameter_count: int) -> float:
-    data = context.split.estimation
-    measured = measured_outputs(data.recording, context.robot.platform.is_rigid_body)
-    value_count = int(np.count_nonzero(np.isfinite(measured[data.rows])))
-    return 0.5 * parameter_count * log(value_count)
+    return 0.5 * parameter_count * log(context.split.estimation.value_count(context.robot.platform.is_rigid_body))

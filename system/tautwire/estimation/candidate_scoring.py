@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, isfinite
 
 from ..robot.schema import Robot
 from .candidate_fits import (
@@ -17,10 +17,12 @@ from .candidate_fits import (
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
 from .candidate_scores import CandidateScore, misfitted_rival, most_parsimonious, simpler_rival, unfitted_score
 from .disturbance_posterior import disturbance_prior
+from .estimation_data import DataSplit
 from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .score_test import PredictedGain, score_tests_in_workers
+from .speed_versions import split_with_other_interpolation
 from .time_limit import OutOfTimeError
 
 Predictions = dict[Hypothesis, PredictedGain]
@@ -48,6 +50,32 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
     context.progress(f"{label}: done", 1.0)
     unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
     return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
+
+
+def likelier_interpolation(context: IdentificationContext, scores: Sequence[CandidateScore]) -> DataSplit | None:
+    """The data with winch speeds interpolated otherwise, where the best effects of a first round are likelier so.
+
+    None beside a disturbance, which is judged anew later, and where the best one leaves no more than white noise: an
+    error of interpolation passes for an effect, or hides which one it is.
+    """
+    policy, best_of_effects = context.policy.selection, {}
+    for score in sorted((s for s in scores if isfinite(s.mean_square)), key=lambda score: score.evidence):
+        best_of_effects[score.hypothesis.effect.name] = score
+    ranked = sorted(best_of_effects.values(), key=lambda score: -score.evidence)[: policy.fits_with_other_interpolation]
+    value_count = context.split.validation.value_count(context.robot.platform.is_rigid_body)
+    largest_by_chance = 1.0 + policy.max_chance_deviations * (2.0 / value_count) ** 0.5
+    if context.fitter.has_disturbance or not ranked or ranked[0].mean_square <= largest_by_chance:
+        return None
+    split = split_with_other_interpolation(context.split)
+    if split is None:
+        return None
+    baseline = context.fitter.log_likelihood(context.robot, (), context.split.validation)
+    tolerance = context.policy.fit.coarse_cost_tolerance
+    tasks = {s.hypothesis: FitTask((s.hypothesis,), (s.fit.robot,), -inf, tolerance) for s in ranked}
+    label = "winch speeds interpolated otherwise"
+    others = fit_candidates(replace(context, split=split), label, tasks, split.estimation, baseline)
+    gain = max((score.evidence for score in others.values()), default=-inf) - ranked[0].evidence
+    return split if gain >= context.policy.preprocessing.min_speed_gain else None
 
 
 def _scores_beside_noise(

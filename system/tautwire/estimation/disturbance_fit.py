@@ -26,7 +26,6 @@ from .disturbance_posterior import (
 )
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, with_values
-from .measured_outputs import measured_outputs
 from .parameter_fit import Fit, Fitter, parameter_bounds, parameter_scales
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import DisturbancePolicy
@@ -99,9 +98,8 @@ def marginal_log_likelihood(
     maximised = with_improved_disturbance if is_coarse else with_fitted_disturbance
     fitter = maximised(fitter, robot, chosen, data)
     numbers = disturbance_prior(robot, fitter.noise, fitter.policy.disturbance).log_deviations
-    measured = measured_outputs(data.recording, robot.platform.is_rigid_body)
-    value_count = int(np.count_nonzero(np.isfinite(measured[data.rows])))
-    return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))
+    value_count = max(data.value_count(robot.platform.is_rigid_body), 1)
+    return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(value_count)
 
 
 def _value(evaluation: Evaluation) -> float:

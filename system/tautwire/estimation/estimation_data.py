@@ -14,7 +14,7 @@ from ..robot.measured_start import with_measured_start, with_true_start
 from ..robot.schema import Quaternion, Robot
 from ..robot.static_equilibrium import start_orientation
 from .kalman_filter import Noise
-from .measured_outputs import orientations
+from .measured_outputs import measured_outputs, orientations
 from .policy import DEFAULT_POLICY, FitPolicy
 
 
@@ -33,6 +33,10 @@ class DataSet:
     def placed(self, robot: Robot) -> Robot:
         """The robot at the start of the recording, as the sensors show it."""
         return with_measured_start(robot, self.start, self.orientation)
+
+    def value_count(self, is_rigid: bool) -> int:
+        """Number of measured values in the rows that count; ``is_rigid`` where orientations are among them."""
+        return int(np.count_nonzero(np.isfinite(measured_outputs(self.recording, is_rigid)[self.rows])))
 
     def head(self, policy: FitPolicy = DEFAULT_POLICY.fit) -> DataSet:
         """The first samples that count, enough to rank hypotheses by: a third, of 800 to 20,000."""

@@ -47,12 +47,21 @@ def begin_localisation(state: Identification) -> Identification:
 
 
 def select(state: Identification) -> Identification:
-    """Select effects in the recordings as they are."""
-    state = replace(state, selection=select_effects(state.context))
-    if state.selection.disturbance:
-        fitter = state.context.fitter.with_disturbance(state.selection.disturbance)
+    """Select effects in the recordings as they are, or with winch speeds interpolated otherwise."""
+    selection = select_effects(state.context)
+    if selection.split is not None:
+        state = start_side_runs(_interpolated(state, selection.split))
+    if selection.disturbance:
+        fitter = state.context.fitter.with_disturbance(selection.disturbance)
         state = replace(state, context=replace(state.context, fitter=fitter))
-    return state
+    return replace(state, selection=selection)
+
+
+def _interpolated(state: Identification, split: DataSplit) -> Identification:
+    """The state with data whose winch speeds are interpolated otherwise."""
+    prepared = with_other_interpolation(state.prepared, state.context.robot, split)
+    context = replace(state.context, fitter=prepared.fitter, split=split)
+    return replace(state, context=context, prepared=prepared)
 
 
 def select_in_corrected_recordings(state: Identification) -> Identification:
@@ -61,8 +70,7 @@ def select_in_corrected_recordings(state: Identification) -> Identification:
         if not state.selection_explains:
             state.context.time_limit.check()
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
-            state = start_side_runs(replace(state, context=context, prepared=prepared))
-            state = replace(state, selection=select_effects(context))
+            state = select(start_side_runs(replace(state, context=context, prepared=prepared)))
     return state
 
 
@@ -71,14 +79,13 @@ def select_with_other_interpolation(state: Identification) -> Identification:
 
     Where these are far likelier under the effects selected: before, the largest effect decides which seem so.
     """
-    split = split_with_other_interpolation(state.context.split) if state.context.fitter.has_disturbance else None
+    split = split_with_other_interpolation(state.context.split)
     if split is None or not _is_far_likelier(state, split):
         return state
-    prepared = with_other_interpolation(state.prepared, state.context.robot, split)
-    context, untried = replace(state.context, fitter=prepared.fitter, split=split), state.context.time_limit.untried
-    other = select(start_side_runs(replace(state, context=context, prepared=prepared)))
+    untried = state.context.time_limit.untried
+    other = select(start_side_runs(_interpolated(state, split)))
     # A search that was cut short may have lost what the first one found.
-    return other if context.time_limit.untried == untried else state
+    return other if other.context.time_limit.untried == untried else state
 
 
 def _is_far_likelier(state: Identification, split: DataSplit) -> bool:
@@ -86,7 +93,10 @@ def _is_far_likelier(state: Identification, split: DataSplit) -> bool:
     fitter, selection, least = state.context.fitter, state.selection, state.context.policy.preprocessing.min_speed_gain
     robot, chosen, data = selection.fit.robot, selection.accepted, state.context.split.estimation
     before = fitter.log_likelihood(robot, chosen, data)
-    if abs(fitter.log_likelihood(robot, chosen, split.estimation) - before) < least:
+    gain = fitter.log_likelihood(robot, chosen, split.estimation) - before
+    # What leaves white noise leaves nothing for other data to explain.
+    is_explained = not fitter.has_disturbance and state.selection_explains
+    if abs(gain) < least or (gain < 0.0 and is_explained):
         return False
     try:
         fit = fitter.fit_from([robot], chosen, split.estimation, -inf)

@@ -37,6 +37,11 @@ class Innovations:
         terms = self.values[mask] ** 2 + self.log_variances[mask] + log(2.0 * pi)
         return float(-0.5 * np.sum(terms))
 
+    def misfit(self, rows: NDArray[np.bool_]) -> float:
+        """Half of what the squares of the samples in ``rows`` exceed their number by: nats, of a perfect model none."""
+        mask = self.observed & rows[:, None]
+        return 0.5 * float(np.sum(self.values[mask] ** 2 - 1.0))
+
     def mean_square(self, rows: NDArray[np.bool_]) -> Array:
         """Mean square of each output's innovations, shape (m,); one where the model is right, NaN if unobserved."""
         count = np.sum(self.observed[rows], axis=0)

@@ -99,6 +99,10 @@ class SelectionPolicy:
     coarse_tie_ratio: float = 1e-3
     # How many of the best predictions are fitted to all samples whatever their coarse fit says. Chosen.
     always_refitted: int = 2
+    # How many of the first round's best effects are fitted with winch speeds interpolated otherwise. Chosen.
+    fits_with_other_interpolation: int = 3
+    # Standard deviations by which the mean square of innovations may exceed that of white noise by chance. Chosen.
+    max_chance_deviations: float = 3.0
     # Mean square of innovations below which a model needs no larger form of the same effects; white noise has 1.
     # Chosen, not calibrated.
     max_noise_mean_square: float = 1.1

@@ -175,14 +175,19 @@ def prepare_data(
 def _with_likely_interpolation(
     fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
 ) -> tuple[Fitter, DataSplit]:
-    """The disturbance fitted to FIT, with winch speeds linear between samples unless cubic ones are far likelier."""
+    """The disturbance fitted to FIT, with winch speeds linear between samples unless cubic ones are far likelier.
+
+    Without a disturbance they have to explain a share of what the model misses, too, which an effect may have left.
+    """
     fitter = with_fitted_disturbance(fitter, robot, (), split.estimation)
-    smooth = split_with_other_interpolation(split) if fitter.has_disturbance else None
+    smooth = split_with_other_interpolation(split)
     if smooth is None:
         return fitter, split
     innovations, rows = fitter.innovations(robot, split.estimation), split.estimation.rows
     gain = fitter.log_likelihood(robot, (), smooth.estimation) - innovations.log_likelihood(rows)
-    if gain <= policy.min_cubic_gain * int(np.sum(innovations.observed[rows])):
+    misfit = 0.0 if fitter.has_disturbance else innovations.misfit(rows)
+    value_count = int(np.sum(innovations.observed[rows]))
+    if gain <= max(policy.min_cubic_gain * value_count, policy.min_speed_gain_to_misfit * misfit):
         return fitter, split
     return with_fitted_disturbance(fitter, robot, (), smooth.estimation), smooth
 

@@ -9,6 +9,7 @@ from ..robot.schema import Robot
 from .candidate_fits import fit_model
 from .disturbance import Disturbance
 from .disturbance_fit import joint_fit, with_fitted_disturbance
+from .estimation_data import DataSplit
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit
@@ -20,7 +21,8 @@ from .trace_result import Candidate
 class SelectionResult:
     """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates.
 
-    ``disturbance`` is the one beside them, None where none was assumed.
+    ``disturbance`` is the one beside them, None where none was assumed; ``split`` are the data with winch speeds
+    interpolated otherwise than those that the search began with, where these are likelier.
     """
 
     accepted: tuple[Hypothesis, ...]
@@ -29,6 +31,7 @@ class SelectionResult:
     candidates: tuple[Candidate, ...]
     confusable: tuple[tuple[str, ...], ...]
     disturbance: Disturbance | None = None
+    split: DataSplit | None = None
 
     def substantial(self, policy: SelectionPolicy) -> tuple[Hypothesis, ...]:
         """The accepted hypotheses with more evidence than what the strongest one's form may leave."""

@@ -61,8 +61,7 @@ def speed_versions(
     other = with_fitted_disturbance(other, robot, (), estimation)
     rows, before = split.estimation.rows, fitter.innovations(robot, split.estimation)
     gain = other.log_likelihood(robot, (), estimation) - before.log_likelihood(rows)
-    misfit = 0.5 * float(np.sum(before.values[before.observed & rows[:, None]] ** 2 - 1.0))
-    decisive_gain = max(policy.min_speed_gain, policy.min_speed_gain_to_misfit * misfit)
+    decisive_gain = max(policy.min_speed_gain, policy.min_speed_gain_to_misfit * before.misfit(rows))
     is_undecided = decisive_gain > policy.min_speed_gain and not fitter.has_disturbance and recorded.rope_lengths
     if gain < decisive_gain and not is_undecided:
         return [as_recorded]

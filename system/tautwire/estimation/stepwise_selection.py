@@ -24,8 +24,9 @@ from .candidate_scores import (
     most_parsimonious,
     without_fast_relaxations,
 )
-from .candidate_scoring import score_candidates
+from .candidate_scoring import likelier_interpolation, score_candidates
 from .disturbance_fit import marginal_log_likelihood
+from .estimation_data import DataSplit
 from .explained_shares import missed_on_validation, missed_without_effects
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
@@ -92,6 +93,7 @@ class _StepwiseSelection:
     confusable: dict[Hypothesis, list[str]] = field(default_factory=dict)
     evidences: dict[Hypothesis, float] = field(default_factory=dict)
     survivors: list[Hypothesis] = field(default_factory=list)
+    split: DataSplit | None = None
 
     def add(self) -> None:
         """Forward selection: the best hypothesis of each round, while it is significant."""
@@ -103,6 +105,9 @@ class _StepwiseSelection:
             number = self._next_number()
             search_round = _search_round(self.context, number, self.current.robot, self.accepted)
             scores, is_complete = score_candidates(self.context, search_round)
+            if not self.accepted and self._interpolates_otherwise(scores):
+                search_round = _search_round(self.context, number, self.current.robot, self.accepted)
+                scores, is_complete = score_candidates(self.context, search_round)
             if is_complete:
                 self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
@@ -118,6 +123,13 @@ class _StepwiseSelection:
                 self.eliminate()
             if self.accepted == before:
                 break
+
+    def _interpolates_otherwise(self, scores: Sequence[CandidateScore]) -> bool:
+        """Interpolate winch speeds otherwise where a first round shows them likelier so; tells whether it does."""
+        split = likelier_interpolation(self.context, scores)
+        if split is not None:
+            self.context, self.split = replace(self.context, split=split), split
+        return split is not None
 
     def _next_number(self) -> int:
         """Number of the round that follows those with candidates."""
@@ -245,6 +257,7 @@ class _StepwiseSelection:
             tuple(self.candidates),
             tuple((a.effect.name, other) for a in self.accepted for other in self.confusable.get(a, ())),
             self.context.fitter.noise.disturbance,
+            self.split,
         )
 
     def _accept_beside(self, others: Sequence[Hypothesis], best: CandidateScore) -> None:
