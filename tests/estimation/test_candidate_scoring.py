@@ -171,3 +171,45 @@ def test_a_round_beside_a_disturbance_has_the_shortlist_for_it(
     monkeypatch.setattr(candidate_scoring, "grid_search", lambda *_: {})
     candidate_scoring.score_candidates(context, SearchRound(1, robot, (), None, True, has_disturbance))
     assert len(begun) == (2 if has_disturbance else 3)
+
+
+@pytest.mark.parametrize(
+    ("mean_square", "evidence_otherwise", "has_other", "is_otherwise"),
+    [
+        (1.5, 1030.0, True, True),
+        (1.5, 1010.0, True, False),
+        (1.5, None, True, False),
+        (1.0, 1030.0, True, False),
+        (1.5, 1030.0, False, False),
+    ],
+)
+def test_winch_speeds_are_interpolated_otherwise_where_the_best_effects_are_far_likelier_so(
+    monkeypatch: pytest.MonkeyPatch,
+    mean_square: float,
+    evidence_otherwise: float | None,
+    has_other: bool,
+    is_otherwise: bool,
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    other = replace(context.split, notes=("cubic",))
+    fit = Fit.without_parameters(robot)
+    names = ("relaxation", "relaxation", "damping", "creep", "slack", "friction")
+    evidence = (1000.0, 900.0, 500.0, 400.0, 0.0, 300.0)
+    scores = [
+        CandidateScore(Hypothesis(BY_NAME[name], (number,)), fit, nats, mean_square if nats else float("nan"))
+        for number, (name, nats) in enumerate(zip(names, evidence, strict=True))
+    ]
+
+    def refitted(
+        context: IdentificationContext, label: str, tasks: dict[Hypothesis, FitTask], data: object, baseline: float
+    ) -> dict[Hypothesis, CandidateScore]:
+        assert [h.effect.name for h in tasks] == ["relaxation", "damping", "creep"]
+        assert context.split is other
+        likeliest = [h for h in tasks if h.effect.name == "damping" and evidence_otherwise]
+        return {h: CandidateScore(h, fit, evidence_otherwise or 0.0, 1.0) for h in likeliest}
+
+    monkeypatch.setattr(candidate_scoring, "fit_candidates", refitted)
+    monkeypatch.setattr(candidate_scoring, "split_with_other_interpolation", lambda split: other if has_other else None)
+    assert candidate_scoring.likelier_interpolation(context, scores) is (other if is_otherwise else None)

@@ -37,3 +37,13 @@ def test_where_nothing_is_hidden_nothing_is_named() -> None:
 def test_on_robots_as_they_are_what_is_hidden_is_named_alone(name: str, effect: str) -> None:
     result = traced(f"lifelike/{name}")
     assert (result.verdict, [each.name for each in result.effects]) == ("effects", [effect])
+
+
+def test_a_real_robot_without_load_cells_has_drums_each_of_its_own_radius() -> None:
+    result = traced("real-planar")
+    assert result.verdict == "effects"
+    assert [(each.name, each.cables) for each in result.effects] == [("drum", (cable,)) for cable in (1, 2, 3, 4)]
+    ratios = [each.parameters["radius_ratio"].value for each in result.effects]
+    assert all(0.935 < ratio < 0.944 for ratio in ratios), ratios
+    check = result.comparisons[1]
+    assert check.errors_after.position_rms < check.errors_before.position_rms / 6.0

@@ -43,8 +43,13 @@ def kinematic_scale_notes(robot: Robot, recording: Recording) -> tuple[str, ...]
 
     Kinematics know nothing of ropes that stretch: the scales are of what the platform moved, not of what was unwound.
     """
-    _, scales = _lag_and_scales(robot, recording)
+    scales = kinematic_scales(robot, recording)
     return (f"{recording.path}: by kinematics alone {_scales_text(scales)}",) if scales else ()
+
+
+def kinematic_scales(robot: Robot, recording: Recording) -> tuple[WinchScale, ...]:
+    """The scales of winches by kinematics alone; none where the robot declares an effect that changes lengths."""
+    return _lag_and_scales(robot, recording)[1]
 
 
 def _lag_and_scales(robot: Robot, recording: Recording) -> tuple[PositionLag | None, tuple[WinchScale, ...]]:
