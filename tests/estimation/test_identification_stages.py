@@ -14,7 +14,9 @@ from tautwire.estimation.explained_shares import ExplainedShares
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext, no_progress
 from tautwire.estimation.identification_stages import (
+    _is_far_likelier,
     drop_least_evident_effects,
+    select,
     select_beside_disturbance,
     select_with_other_interpolation,
 )
@@ -161,3 +163,60 @@ def test_a_second_search_counts_only_when_it_is_complete(monkeypatch: pytest.Mon
     result = select_with_other_interpolation(first)
     assert result is first if is_cut_short else result.selection is second
     assert is_cut_short or (result.prepared, result.context.split) == (prepared, "other data")
+
+
+def test_a_selection_with_speeds_interpolated_otherwise_brings_its_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    state = with_effects("modulus", modulus=0.1)
+    selection = replace(with_effects("damping", damping=0.1).selection, split=cast("Any", "other data"))
+    prepared, started = SimpleNamespace(fitter="fitter of these"), []
+
+    def side_runs(state: Identification) -> Identification:
+        started.append(state.prepared)
+        return state
+
+    for name, stand_in in {
+        "select_effects": lambda context: selection,
+        "with_other_interpolation": lambda *_: prepared,
+        "start_side_runs": side_runs,
+    }.items():
+        monkeypatch.setattr(identification_stages, name, stand_in)
+    result = select(state)
+    assert (result.selection, result.prepared, started) == (selection, prepared, [prepared])
+    assert (result.context.split, result.context.fitter) == ("other data", "fitter of these")
+
+
+@pytest.mark.parametrize(
+    ("as_they_are", "refitted", "explains", "has_disturbance", "is_likelier"),
+    [
+        (30.0, 30.0, True, False, True),
+        (-500.0, 30.0, False, False, True),
+        (-500.0, 30.0, True, True, True),
+        (-500.0, 30.0, True, False, False),
+        (-500.0, 10.0, False, False, False),
+        (10.0, 30.0, False, False, False),
+    ],
+)
+def test_other_speeds_are_judged_with_effects_fitted_anew_unless_the_residual_is_white(
+    monkeypatch: pytest.MonkeyPatch,
+    as_they_are: float,
+    refitted: float,
+    explains: bool,
+    has_disturbance: bool,
+    is_likelier: bool,
+) -> None:
+    """Gains in nats, of 20 that are needed, and before and after the effects are fitted to the other data."""
+    state = with_effects("modulus", modulus=0.1)
+    now, other = (SimpleNamespace(estimation=name) for name in ("now", "other"))
+    robot = replace(ROBOT, name="refitted")
+
+    def log_likelihood(robot: Any, chosen: object, data: str) -> float:
+        return {"now": 1000.0, "other": 1000.0 + (refitted if robot.name == "refitted" else as_they_are)}[data]
+
+    fitter = SimpleNamespace(
+        has_disturbance=has_disturbance,
+        log_likelihood=log_likelihood,
+        fit_from=lambda *_: SimpleNamespace(robot=robot),
+    )
+    state = replace(state, context=replace(cast("Any", state.context), fitter=fitter, split=now))
+    monkeypatch.setattr(Identification, "selection_explains", explains)
+    assert _is_far_likelier(state, cast("Any", other)) == is_likelier
