@@ -1,13 +1,16 @@
 """Winch speeds that are samples of a smooth motion, against the rig, which moves smoothly between samples."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from tautwire.estimation import identification, trace
+from tautwire.estimation import identification, preprocessing, trace
 from tautwire.estimation.cosimulation_validation import cosimulate_data_set
 from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.policy import DEFAULT_POLICY
@@ -106,6 +109,30 @@ def test_speeds_are_cubic_where_that_is_far_likelier(robot: Robot) -> None:
         prepared, *_ = prepare_data(robot, *recordings, WorkerPool(1))
         is_cubic = prepared.split.estimation.recording.winch_acceleration is not None
         assert is_cubic == is_smooth
+
+
+@pytest.mark.parametrize(
+    ("square", "has_disturbance", "is_cubic"), [(1.0, False, True), (41.0, False, False), (41.0, True, True)]
+)
+def test_without_a_disturbance_cubic_speeds_explain_a_share_of_the_misfit(
+    monkeypatch: pytest.MonkeyPatch, square: float, has_disturbance: bool, is_cubic: bool
+) -> None:
+    """They gain 20 nats on 100 values."""
+    split, smooth = (SimpleNamespace(estimation=SimpleNamespace(rows=np.ones(50, dtype=bool))) for _ in range(2))
+    zeros = np.zeros((50, 2))
+    innovations = Innovations(np.ones((50, 2), dtype=bool), np.full((50, 2), square**0.5), zeros, zeros)
+    fitter = SimpleNamespace(
+        has_disturbance=has_disturbance,
+        innovations=lambda robot, data: innovations,
+        log_likelihood=lambda *_: 20.0 + innovations.log_likelihood(split.estimation.rows),
+    )
+    monkeypatch.setattr(preprocessing, "with_fitted_disturbance", lambda fitter, *_: fitter)
+    monkeypatch.setattr(preprocessing, "split_with_other_interpolation", lambda split: smooth)
+    fitter_after, split_after = preprocessing._with_likely_interpolation(
+        cast("Any", fitter), THREE, cast("Any", split), DEFAULT_POLICY.preprocessing
+    )
+    assert fitter_after is fitter
+    assert (split_after is smooth) == is_cubic
 
 
 @pytest.mark.validate
