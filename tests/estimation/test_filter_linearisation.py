@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tautwire.estimation.filter_linearisation import factorised, linearise_filter
+from tautwire.estimation.filter_linearisation import cholesky_factors, linearise_filter
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tests.support.recordings import recorded
@@ -39,10 +39,9 @@ def test_a_covariance_that_rounding_left_indefinite_is_factorised_all_the_same()
     # Two outputs of one metre each that are equal but for rounding, and a third in newtons.
     indefinite = np.array([[1.0, 1.0 + 1e-15, 0.0], [1.0 + 1e-15, 1.0, 0.0], [0.0, 0.0, 1e8]])
     regular, broken = np.diag([1e-8, 1e-8, 1.0]), np.full((3, 3), np.nan)
-    covariance, factor = factorised(np.array([indefinite, regular, broken]))
-    np.testing.assert_allclose(factor[:2] @ factor[:2].swapaxes(1, 2), covariance[:2], rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(covariance[0], indefinite, rtol=1e-9)
-    np.testing.assert_allclose(covariance[1], regular, rtol=1e-15)
-    assert np.all(np.isfinite(np.linalg.inv(covariance[:2])))
-    assert np.all(np.isnan(factor[2]))
-    np.testing.assert_array_equal(factorised(regular[None])[1][0], np.linalg.cholesky(regular))
+    factors = cholesky_factors(np.array([indefinite, regular, broken]))
+    np.testing.assert_allclose(factors[0] @ factors[0].T, indefinite, rtol=1e-9)
+    np.testing.assert_allclose(factors[1] @ factors[1].T, regular, rtol=1e-15)
+    assert np.all(np.isfinite(np.linalg.inv(factors[:2])))
+    assert np.all(np.isnan(factors[2]))
+    np.testing.assert_array_equal(cholesky_factors(regular[None])[0], np.linalg.cholesky(regular))

@@ -104,10 +104,9 @@ def linearise_filter(
         output_matrix = results.output_matrices
         cross_covariance = results.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
-        covariance, cholesky_factor = factorised(covariance)
-        whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
-        gain = cross_covariance @ np.linalg.inv(covariance)
-        corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
+        inverse_factor = np.linalg.inv(cholesky_factors(covariance))
+        whitened_gain = cross_covariance @ inverse_factor.swapaxes(1, 2)
+        corrections = (whitened_gain @ innovations[:, :, None])[:, :, 0]
         updated = likelihood.with_true_lengths(predicted + corrections.T)
         rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
         yield LinearisedSegment(
@@ -119,8 +118,8 @@ def linearise_filter(
             results.transitions,
             _half_transition(results.transitions[:, :size, :size], rate_jacobian, step[0]),
             output_matrix,
-            gain,
-            whitening,
+            whitened_gain @ inverse_factor,
+            np.where(is_observed, inverse_factor, 0.0),
             is_observed[:, :, 0],
             segment.is_recorded,
             innovations,
@@ -135,13 +134,13 @@ def _half_transition(transition: Array, rate_jacobian: Array, step: Array) -> Ar
     return 0.5 * (transition + identity) + bend
 
 
-def factorised(covariance: Array) -> tuple[Array, Array]:
-    """Covariances (K, m, m) and their Cholesky factors.
+def cholesky_factors(covariance: Array) -> Array:
+    """Cholesky factors of covariances (K, m, m).
 
     Where rounding has left one not positive definite, its eigenvalues are raised; NaN where one is not finite.
     """
     try:
-        return covariance, np.asarray(np.linalg.cholesky(covariance), dtype=float)
+        return np.asarray(np.linalg.cholesky(covariance), dtype=float)
     except np.linalg.LinAlgError:
         is_finite = np.all(np.isfinite(covariance), axis=(1, 2), keepdims=True)
         deviations = np.sqrt(np.maximum(np.abs(np.diagonal(covariance, axis1=1, axis2=2)), np.finfo(float).tiny))
@@ -149,5 +148,4 @@ def factorised(covariance: Array) -> tuple[Array, Array]:
         eigenvalues, vectors = np.linalg.eigh(np.where(is_finite, covariance / scale, np.eye(covariance.shape[1])))
         raised = np.maximum(eigenvalues, MIN_RELATIVE_EIGENVALUE)[:, None, :]
         definite = np.where(is_finite, scale, 1.0) * ((vectors * raised) @ vectors.swapaxes(1, 2))
-        factors = np.asarray(np.linalg.cholesky(definite), dtype=float)
-        return np.where(is_finite, definite, np.nan), np.where(is_finite, factors, np.nan)
+        return np.where(is_finite, np.asarray(np.linalg.cholesky(definite), dtype=float), np.nan)
