@@ -147,6 +147,11 @@ class EffectSensitivities:
 
     def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
         """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
+        rate_sensitivities, output_sensitivities = self.along(run)
+        return run.integrated_forcing(rate_sensitivities), output_sensitivities
+
+    def along(self, run: LinearisedSegment) -> tuple[Array, Array]:
+        """Sensitivities of the rates (K + 1, n, p) and outputs (K, m, p) along the next segment of the run."""
         inputs = np.pad(run.speeds, ((0, self._input_count - len(run.speeds)), (0, 0)))
         columns = (run.speeds[:, 1:], run.step[None, :], run.shift, run.rotation)
         instant = [_with_last_column_repeated(column) for column in columns]
@@ -156,7 +161,7 @@ class EffectSensitivities:
         rate_sensitivities, output_sensitivities = (
             np.concatenate(parts, axis=2) for parts in zip(*per_trial, strict=True)
         )
-        return run.integrated_forcing(rate_sensitivities), output_sensitivities[:-1]
+        return rate_sensitivities, output_sensitivities[:-1]
 
     def _derivatives_at_grid_point(
         self, run: LinearisedSegment, inputs: Array, instant: Sequence[Array], trial: int

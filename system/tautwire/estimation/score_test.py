@@ -175,9 +175,10 @@ def statistics_of_runs(
         counting = np.zeros(len(run.is_recorded), dtype=bool)
         counting[run.is_recorded] = rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
         recorded_rows += int(np.sum(run.is_recorded))
-        forcing_terms = [effect.forcing_terms(run) for effect in effects]
+        by_effect = [effect.along(run) for effect in effects]
+        by_rates, by_outputs = (np.concatenate(part, axis=2) for part in zip(*by_effect, strict=True))
         state_sensitivities, innovation_sensitivities = run.propagate_sensitivities(
-            state_sensitivities, *(np.concatenate(part, axis=2) for part in zip(*forcing_terms, strict=True))
+            state_sensitivities, run.integrated_forcing(by_rates), by_outputs
         )
         jacobian = np.concatenate([run.sensitivities, innovation_sensitivities], axis=2)[counting].reshape(
             -1, len(nominal_values)
