@@ -55,6 +55,22 @@ def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(pr
 
 
 @pytest.mark.validate
+def test_coarse_integration_steps_leave_separations_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, decision_variables = example("caroca"), np.random.default_rng(3).uniform(size=18)
+    effects, options = effects_by_name(robot, "damping,relaxation"), DesignOptions(default_limits(robot), 10.0, 0.02, 1)
+    designs = [input_design._design_problem(robot, effects, options)]
+    monkeypatch.setattr(input_design, "MAX_STATE_ANGLE", None)
+    designs.append(input_design._design_problem(robot, effects, options))
+    coarse, fine = (design.likelihood._filter_functions._substeps.state for design in designs)
+    assert coarse < 0.25 * fine
+    recordings = [design.program(decision_variables)[1] for design in designs]
+    tensions = [recording.tension for recording in recordings]
+    assert np.max(np.abs(tensions[0] - tensions[1])) < 0.01
+    nats = [[pair.nats for pair in design.separations(each)] for design, each in zip(designs, recordings, strict=True)]
+    assert nats[0] == pytest.approx(nats[1], rel=5e-4)
+
+
+@pytest.mark.validate
 def test_the_best_program_is_within_the_limits_and_better_than_most(monkeypatch: pytest.MonkeyPatch) -> None:
     effects = effects_by_name(THREE, "damping,relaxation")
     found = design_excitation(THREE, effects, DesignOptions(LIMITS, 3.0, 0.05, 10, 1), quiet)
@@ -125,7 +141,7 @@ def test_rotations_stay_within_their_limit_and_shrink_with_the_path() -> None:
     limits = default_limits(robot)
     assert limits.turn == pytest.approx(0.2)
     options = DesignOptions(limits, 10.0, 0.05, 1)
-    problem = input_design._DesignProblem(robot, (), options, None, (), None)  # type: ignore[arg-type]
+    problem = input_design._DesignProblem(robot, (), options, None, ())  # type: ignore[arg-type]
     times = np.linspace(0.0, 10.0, 501)
     paths = [problem._path(np.random.default_rng(5).uniform(size=36), scale) for scale in (1.0, 0.5)]
     turns = [path.rotation.rotation_vector.position(times) for path in paths if isinstance(path, PoseTrajectory)]

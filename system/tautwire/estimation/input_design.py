@@ -28,7 +28,6 @@ from ..robot.schema import Point, Robot
 from ..robot.trajectory import Trajectory
 from ..robot.winch_speeds import ideal_winch_speeds
 from .effect_sensitivities import EffectSensitivities
-from .estimation_data import DataSet
 from .excitation_limits import ExcitationLimits, can_turn
 from .filter_linearisation import linearise_filter
 from .hypotheses import Hypothesis, hypotheses
@@ -36,7 +35,6 @@ from .identifiability import separation_nats, start_steps
 from .likelihood import Likelihood
 from .measurement_noise import declared_noise
 from .multisine import MultisinePath
-from .parameter_fit import Fitter
 from .score_test import effect_sensitivities, statistics_of_runs
 from .worker_pool import map_in_forks
 
@@ -48,6 +46,8 @@ SLOW_SINES, FAST_SINES = 2, 1
 SINES = SLOW_SINES + FAST_SINES
 SHRINK_FACTOR, MAX_SHRINKS = 0.7, 12
 INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
+# Radians of the fastest vibration in one integration step: six times those of fits move separations by 3e-4 at most.
+MAX_STATE_ANGLE = 0.3
 
 
 class ExcitationError(TautwireError):
@@ -167,7 +167,6 @@ class _DesignProblem:
     options: DesignOptions
     likelihood: Likelihood
     sensitivities: tuple[EffectSensitivities, ...]
-    fitter: Fitter
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
@@ -232,11 +231,8 @@ class _DesignProblem:
 
     def separations(self, recording: Recording) -> list[EffectSeparation]:
         """Separations of each effect from each other along a program, the closest first."""
-        every_row = np.ones(len(recording.time), dtype=bool)
-        data = DataSet(recording, self.robot.platform.start, every_row)
-        likelihood, values = self.fitter.likelihood(self.robot, (), data)
-        runs = linearise_filter(likelihood, values, recording)
-        signatures = statistics_of_runs(runs, self.sensitivities, every_row)
+        runs = linearise_filter(self.likelihood, [], recording)
+        signatures = statistics_of_runs(runs, self.sensitivities, np.ones(len(recording.time), dtype=bool))
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
         # An effect that this motion would not show at all (slack, where no rope hangs) does not rank programs.
         visible_effects = [
@@ -258,10 +254,9 @@ class _DesignProblem:
 
 
 def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
-    noise = declared_noise(robot)
-    likelihood = Likelihood(robot, (), noise, options.interval)
+    likelihood = Likelihood(robot, (), declared_noise(robot), options.interval, max_state_angle=MAX_STATE_ANGLE)
     sensitivities = effect_sensitivities(robot, effects, likelihood.model.state_names)
-    return _DesignProblem(robot, effects, options, likelihood, sensitivities, Fitter(noise))
+    return _DesignProblem(robot, effects, options, likelihood, sensitivities)
 
 
 class _InfeasibleError(Exception):

@@ -44,7 +44,8 @@ SEGMENT_SAMPLES_WITH_COVARIANCES = 500
 class Likelihood:
     """Innovations of recordings under a robot whose free parameters vary; compiled once.
 
-    ``poll_interrupts`` is called before each segment of a run.
+    ``poll_interrupts`` is called before each segment of a run. One step of the state turns the fastest vibration by
+    ``max_state_angle`` (rad) at most, by default as finely as fits need.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Likelihood:
         noise: Noise,
         sample_time: float,
         poll_interrupts: Callable[[], None] = lambda: None,
+        max_state_angle: float | None = None,
     ) -> None:
         self.poll_interrupts = poll_interrupts
         self.uncertain = uncertain_parameters(robot)
@@ -63,7 +65,8 @@ class Likelihood:
         self.cable_count = robot.cable_count
         state_count = model.states.numel()
         has_effect_states = state_count > model.indices.lengths.stop + len(self.uncertain)
-        max_angle = MAX_STATE_ANGLE_BESIDE_DISTURBANCE if noise.disturbance else MAX_STATE_ANGLE
+        default_angle = MAX_STATE_ANGLE_BESIDE_DISTURBANCE if noise.disturbance else MAX_STATE_ANGLE
+        max_angle = default_angle if max_state_angle is None else max_state_angle
         substeps = substeps_of_robot(robot, sample_time, state_count, has_effect_states, max_angle)
         self._filter_functions = CompiledFilter(model, len(self.uncertain), robot.cable_count, noise, substeps)
         self._held_constants = np.zeros(0)
