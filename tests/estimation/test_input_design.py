@@ -15,6 +15,7 @@ from tautwire.estimation.multisine import MultisinePath
 from tautwire.robot.pose_trajectory import PoseTrajectory
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import Robot, Sensors
+from tautwire.robot.winch_speeds import ideal_winch_speeds
 from tests.support.rigid_robots import crane_robot, octahedral_robot
 from tests.support.robots import EXAMPLES, example
 
@@ -52,6 +53,26 @@ def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(pr
     assert Bowl.score(best) == max(scores) and len(scores) == tried
     shares = [share for what, share in reported if what == "trying programs"]
     assert len(shares) == len(reported) and shares[0] == 0.0 and shares == sorted(set(shares)) and shares[-1] < 1.0
+
+
+def test_a_path_that_is_far_too_fast_is_refused_by_a_few_of_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    counts: list[int] = []
+
+    def counted(robot: Robot, path: MultisinePath, time: np.ndarray) -> np.ndarray:
+        counts.append(len(time))
+        return ideal_winch_speeds(robot, path, time)
+
+    monkeypatch.setattr(input_design, "ideal_winch_speeds", counted)
+    options = DesignOptions(LIMITS, 10.0, 0.05, 1)
+    problem = input_design._DesignProblem(THREE, (), options, None, ())  # type: ignore[arg-type]
+    path = MultisinePath(THREE.platform.start, 10.0, ((9.0, 0.0, 0.0),), ((0.4, 0.4, 0.4),))
+    assert problem._simulated_within_limits(path) is None and counts == [13]
+    # Between those few samples one is too fast.
+    speeds = counted(THREE, path.scaled(0.01), 0.05 * np.arange(201))
+    fastest = float(np.max(np.abs(speeds)))
+    assert np.max(np.abs(speeds[::16])) < fastest
+    problem = replace(problem, options=replace(options, limits=replace(LIMITS, speed=0.9999 * fastest)))
+    assert problem._simulated_within_limits(path.scaled(0.01)) is None and counts[-2:] == [13, 201]
 
 
 @pytest.mark.validate
