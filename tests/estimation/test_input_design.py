@@ -55,6 +55,36 @@ def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(pr
     assert len(shares) == len(reported) and shares[0] == 0.0 and shares == sorted(set(shares)) and shares[-1] < 1.0
 
 
+def test_what_programs_call_is_compiled_before_processes_are_forked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of them would compile it again."""
+    scored: list[np.ndarray] = []
+
+    class Flat:
+        options, robot = DesignOptions(LIMITS, 3.0, 0.05, 1), THREE
+
+        @staticmethod
+        def score(decision_variables: np.ndarray) -> float:
+            scored.append(decision_variables)
+            return 0.0
+
+    def in_forks(_: object, items: list[np.ndarray], __: object) -> list[float]:
+        assert len(scored) == 1 and not np.any(scored[0])
+        return [0.0 for _ in items]
+
+    monkeypatch.setattr(input_design, "map_in_forks", in_forks)
+    _, scores = input_design._search(Flat(), quiet)  # type: ignore[arg-type]
+    assert len(scores) == 64
+
+
+def test_progress_advances_with_each_effect_that_is_compiled() -> None:
+    reported: list[tuple[str, float]] = []
+    options, effects = DesignOptions(LIMITS, 3.0, 0.05, 1), effects_by_name(THREE, "damping,payload,drag")
+    input_design._design_problem(THREE, effects, options, lambda *report: reported.append(report))
+    shares = [share for _, share in reported]
+    assert {what for what, _ in reported} == {"compiling the filter"}
+    assert shares[0] == 0.0 and shares == sorted(set(shares)) and len(shares) == 4 and shares[-1] < 0.2
+
+
 def test_a_path_that_is_far_too_fast_is_refused_by_a_few_of_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     counts: list[int] = []
 
@@ -79,9 +109,9 @@ def test_a_path_that_is_far_too_fast_is_refused_by_a_few_of_its_samples(monkeypa
 def test_coarse_integration_steps_leave_separations_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     robot, decision_variables = example("caroca"), np.random.default_rng(3).uniform(size=18)
     effects, options = effects_by_name(robot, "damping,relaxation"), DesignOptions(default_limits(robot), 10.0, 0.02, 1)
-    designs = [input_design._design_problem(robot, effects, options)]
+    designs = [input_design._design_problem(robot, effects, options, quiet)]
     monkeypatch.setattr(input_design, "MAX_STATE_ANGLE", None)
-    designs.append(input_design._design_problem(robot, effects, options))
+    designs.append(input_design._design_problem(robot, effects, options, quiet))
     coarse, fine = (design.likelihood._filter_functions._substeps.state for design in designs)
     assert coarse < 0.25 * fine
     recordings = [design.program(decision_variables)[1] for design in designs]

@@ -49,6 +49,8 @@ SPEED_CHECK_STRIDE = 16
 INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
 # Radians of the fastest vibration in one integration step: six times those of fits move separations by 3e-4 at most.
 MAX_STATE_ANGLE = 0.3
+# The filter takes as long to compile as so many effects, the first time on a computer.
+FILTER_WORK = 40
 
 
 class ExcitationError(TautwireError):
@@ -115,8 +117,7 @@ def design_excitation(
     """
     # On matrices as small as these, threads wait for each other longer than one of them computes.
     with threadpool_limits(1):
-        progress("compiling the filter", 0.0)
-        design = _design_problem(robot, tuple(effects), options)
+        design = _design_problem(robot, tuple(effects), options, progress)
         best, scores = _search(design, progress)
         if max(scores) <= INFEASIBLE_SCORE:
             raise ExcitationError(len(scores))
@@ -134,6 +135,8 @@ def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[flo
     population = 2 ** ceil(log2(count))
     generations = max(1, round(design.options.programs / population) - 1)
     scores: list[float] = []
+    # What is called is compiled at its first call, which each process that is forked would do again.
+    design.score(np.zeros(count))
 
     def cost(decision_variables: Array) -> float:
         return -design.score(decision_variables)
@@ -256,10 +259,17 @@ class _DesignProblem:
         return sorted(separations, key=lambda pair: pair.nats)
 
 
-def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
+def _design_problem(
+    robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions, progress: Progress
+) -> _DesignProblem:
+    progress("compiling the filter", 0.0)
     likelihood = Likelihood(robot, (), declared_noise(robot), options.interval, max_state_angle=MAX_STATE_ANGLE)
-    sensitivities = effect_sensitivities(robot, effects, likelihood.model.state_names)
-    return _DesignProblem(robot, effects, options, likelihood, sensitivities)
+    sensitivities: list[EffectSensitivities] = []
+    groups = [[h for h in effects if h.effect is effect] for effect in dict.fromkeys(h.effect for h in effects)]
+    for group in groups:
+        sensitivities += effect_sensitivities(robot, group, likelihood.model.state_names)
+        progress("compiling the filter", len(sensitivities) / (len(groups) + FILTER_WORK))
+    return _DesignProblem(robot, effects, options, likelihood, tuple(sensitivities))
 
 
 class _InfeasibleError(Exception):
