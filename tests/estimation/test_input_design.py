@@ -39,18 +39,21 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
     assert np.max(np.abs(path.scaled(0.5).position(times) - position[0])) < np.max(np.abs(position - position[0]))
 
 
-@pytest.mark.parametrize(("programs", "tried"), [(96, 96), (64, 64), (1, 64)])
+@pytest.mark.parametrize(("programs", "tried"), [(96, 96), (64, 64), (1, 32)])
 def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(programs: int, tried: int) -> None:
     class Bowl:
         options, robot = DesignOptions(LIMITS, 3.0, 0.05, programs), THREE
 
         @staticmethod
         def score(decision_variables: np.ndarray) -> float:
+            assert np.all((decision_variables >= 0.0) & (decision_variables <= 1.0))
             return -float(np.sum((decision_variables - 0.3) ** 2))
 
     reported: list[tuple[str, float]] = []
     best, scores = input_design._search(Bowl(), lambda *report: reported.append(report))  # type: ignore[arg-type]
     assert Bowl.score(best) == max(scores) and len(scores) == tried
+    # Programs near the best one are better than any that were spread.
+    assert max(scores) > max(scores[:32]) or tried == 32
     shares = [share for what, share in reported if what == "trying programs"]
     assert len(shares) == len(reported) and shares[0] == 0.0 and shares == sorted(set(shares)) and shares[-1] < 1.0
 
@@ -73,7 +76,7 @@ def test_what_programs_call_is_compiled_before_processes_are_forked(monkeypatch:
 
     monkeypatch.setattr(input_design, "map_in_forks", in_forks)
     _, scores = input_design._search(Flat(), quiet)  # type: ignore[arg-type]
-    assert len(scores) == 64
+    assert len(scores) == 32
 
 
 def test_progress_advances_with_each_effect_that_is_compiled() -> None:

@@ -4,20 +4,20 @@ The separation follows from linearising the estimator's filter along the program
 fits start, with signature ``a_i``, is ``|a_i|^2 (1 - cos^2) / 2`` nats from the best that effect ``j`` can do in its
 place.
 
-Source: optimal input design, Goodwin and Payne (1977), Dynamic System Identification, ch. 6; differential evolution,
-Storn and Price (1997), J. Global Optimization 11, 341-359.
+Source: optimal input design, Goodwin and Payne (1977), Dynamic System Identification, ch. 6; evolution strategies,
+Beyer and Schwefel (2002), Natural Computing 1, 3-52.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, log2, log10
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, differential_evolution
+from scipy.stats.qmc import Sobol
 from threadpoolctl import threadpool_limits
 
 from ..errors import InputError, TautwireError
@@ -47,6 +47,9 @@ SINES = SLOW_SINES + FAST_SINES
 SHRINK_FACTOR, MAX_SHRINKS = 0.7, 12
 SPEED_CHECK_STRIDE = 16
 INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
+# At least this share of the programs is spread; then come generations, as far from the best one as ``MOVE`` in each
+# decision variable but for a share that is drawn anew.
+SPREAD_SHARE, GENERATION, MOVE, ANEW_SHARE = 1.0 / 3.0, 16, 0.08, 0.1
 # Radians of the fastest vibration in one integration step: six times those of fits move separations by 3e-4 at most.
 MAX_STATE_ANGLE = 0.3
 # The filter takes as long to compile as so many effects, the first time on a computer.
@@ -111,7 +114,7 @@ def design_excitation(
 ) -> Excitation:
     """Design the motion that maximises the smallest separation between effects; the same for the same seed.
 
-    Searched by differential evolution.
+    Some programs are spread over all that there are, the others near the best one so far.
 
     Raises ExcitationError where none is within the limits, and InputError where the sensors' noise is not declared.
     """
@@ -130,38 +133,29 @@ def design_excitation(
 def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[float]]:
     """The best decision variables, and the scores of all programs in the order in which they were tried."""
     # An amplitude and a frequency of each sine on each axis.
-    count = 2 * SINES * (6 if can_turn(design.robot) else 3)
+    count, requested = 2 * SINES * (6 if can_turn(design.robot) else 3), design.options.programs
     # Sobol's sequence is balanced at powers of two.
-    population = 2 ** ceil(log2(count))
-    generations = max(1, round(design.options.programs / population) - 1)
+    spread_count = 2 ** ceil(log2(max(count, SPREAD_SHARE * requested)))
+    generations = max(0, round((requested - spread_count) / GENERATION))
+    total = spread_count + generations * GENERATION
+    random = np.random.RandomState(design.options.seed)
     scores: list[float] = []
     # What is called is compiled at its first call, which each process that is forked would do again.
     design.score(np.zeros(count))
 
-    def cost(decision_variables: Array) -> float:
-        return -design.score(decision_variables)
+    def report(begun: int) -> None:
+        progress("trying programs", (len(scores) + begun) / total)
 
-    def costs(function: Callable[[Array], float], generation: Iterable[Array]) -> list[float]:
-        def report(begun: int) -> None:
-            progress("trying programs", (len(scores) + begun) / ((generations + 1) * population))
-
-        values = map_in_forks(function, list(generation), report)
-        scores.extend(-value for value in values)
-        return values
-
-    best = differential_evolution(
-        cost,
-        Bounds(np.zeros(count), np.ones(count)),
-        init="sobol",
-        popsize=1,
-        maxiter=generations,
-        polish=False,
-        seed=design.options.seed,
-        tol=0.0,
-        updating="deferred",
-        workers=costs,
-    )
-    return best.x, scores
+    tried = Sobol(count, seed=random).random(spread_count)
+    scores += map_in_forks(design.score, list(tried), report)
+    for _ in range(generations):
+        best = tried[np.argmax(scores)]
+        moved = np.clip(best + MOVE * random.standard_normal((GENERATION, count)), 0.0, 1.0)
+        is_anew = random.random_sample(moved.shape) < ANEW_SHARE
+        moved[is_anew] = random.random_sample(np.sum(is_anew))
+        tried = np.vstack([tried, moved])
+        scores += map_in_forks(design.score, list(moved), report)
+    return tried[np.argmax(scores)], scores
 
 
 @dataclass(frozen=True)
