@@ -88,6 +88,18 @@ def test_progress_advances_with_each_effect_that_is_compiled() -> None:
     assert shares[0] == 0.0 and shares == sorted(set(shares)) and len(shares) == 4 and shares[-1] < 0.2
 
 
+def test_a_path_shrinks_until_it_keeps_the_limits_and_finely_no_more_than_they_need() -> None:
+    options = DesignOptions(replace(LIMITS, speed=0.5), 3.0, 0.05, 1)
+    problem = input_design._design_problem(THREE, effects_by_name(THREE, "damping,payload"), options, quiet)
+    decision_variables = np.random.default_rng(0).uniform(size=18)
+    factors = (input_design.SHRINK_FACTOR, input_design.FINE_SHRINK_FACTOR)
+    paths = [problem.program(decision_variables, factor)[0] for factor in factors]
+    coarse, fine = (path for path in paths if isinstance(path, MultisinePath))
+    gain = np.array(fine.amplitudes) / np.array(coarse.amplitudes)
+    assert gain == pytest.approx(gain[0, 0]) and 1.05 < gain[0, 0] < 1.0 / factors[0]
+    assert problem._simulated_within_limits(fine.scaled(1.0 / factors[1])) is None
+
+
 def test_a_path_that_is_far_too_fast_is_refused_by_a_few_of_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     counts: list[int] = []
 
@@ -133,6 +145,10 @@ def test_the_best_program_is_within_the_limits_and_better_than_most(monkeypatch:
     run = integrate(THREE, found.time, found.winch_speed)
     assert np.min(run.tension) > 299.0
     assert np.max(run.tension) < 5001.0
+    # A slightly larger motion would break a limit.
+    assert isinstance(found.path, MultisinePath)
+    larger = ideal_winch_speeds(THREE, found.path.scaled(1.05), found.time)
+    assert np.max(np.abs(larger)) > 0.8 or np.min(integrate(THREE, found.time, larger).tension) < 300.0
     assert [pair.nats for pair in found.pairs] == sorted(pair.nats for pair in found.pairs)
     assert found.pairs[0].nats > 1.2 * found.median_separation
     assert all(pair.effect.effect is not pair.other.effect for pair in found.pairs)

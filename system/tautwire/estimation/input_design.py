@@ -44,12 +44,13 @@ Progress = Callable[[str, float], None]
 # Sines of each axis: slow ones that cover the workspace, and one near the lowest modes.
 SLOW_SINES, FAST_SINES = 2, 1
 SINES = SLOW_SINES + FAST_SINES
-SHRINK_FACTOR, MAX_SHRINKS = 0.7, 12
+# A path that breaks a limit shrinks by such factors, the best one by finer ones, down to a size that shows nothing.
+SHRINK_FACTOR, FINE_SHRINK_FACTOR, MIN_SCALE = 0.7, 0.7 ** (1.0 / 12.0), 0.015
 SPEED_CHECK_STRIDE = 16
 INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
 # At least this share of the programs is spread; then come generations, as far from the best one as ``MOVE`` in each
 # decision variable but for a share that is drawn anew.
-SPREAD_SHARE, GENERATION, MOVE, ANEW_SHARE = 1.0 / 3.0, 16, 0.08, 0.1
+SPREAD_SHARE, GENERATION, MOVE, ANEW_SHARE = 1.0 / 3.0, 8, 0.08, 0.1
 # Radians of the fastest vibration in one integration step: six times those of fits move separations by 3e-4 at most.
 MAX_STATE_ANGLE = 0.3
 # The filter takes as long to compile as so many effects, the first time on a computer.
@@ -124,7 +125,7 @@ def design_excitation(
         best, scores = _search(design, progress)
         if max(scores) <= INFEASIBLE_SCORE:
             raise ExcitationError(len(scores))
-        path, program = design.program(best)
+        path, program = design.program(best, FINE_SHRINK_FACTOR)
         pairs = tuple(design.separations(program))
     median_separation = 10.0 ** float(np.median([score for score in scores if score > INFEASIBLE_SCORE]))
     return Excitation(path, program.time, program.winch_speed, pairs, median_separation)
@@ -175,13 +176,15 @@ class _DesignProblem:
         pairs = self.separations(program)
         return log10(max(pairs[0].nats, MIN_SEPARATION)) if pairs else INFEASIBLE_SCORE
 
-    def program(self, decision_variables: Array) -> tuple[Trajectory, Recording]:
+    def program(self, decision_variables: Array, shrink_factor: float = SHRINK_FACTOR) -> tuple[Trajectory, Recording]:
         """Decode decision variables between 0 and 1 into a path within the limits, and what sensors show along it."""
-        for shrink in range(MAX_SHRINKS):
-            path = self._path(decision_variables, SHRINK_FACTOR**shrink)
+        scale = 1.0
+        while scale > MIN_SCALE:
+            path = self._path(decision_variables, scale)
             recording = self._simulated_within_limits(path)
             if recording is not None:
                 return path, recording
+            scale *= shrink_factor
         raise _InfeasibleError
 
     def _path(self, decision_variables: Array, scale: float) -> Trajectory:
