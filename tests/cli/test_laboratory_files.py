@@ -247,6 +247,7 @@ REFUSED: dict[str, tuple[Writer, str]] = {
         lambda f: text_of(f).encode() + bytes(500),
         "is binary (it has a zero byte), not text",
     ),
+    "a word below the samples": (lambda f: text_of(f) + "End\n", "line 802: has 1 cell, the header has 10"),
     "sums below the samples": (lambda f: text_of(f) + "Mean" + ",0" * 9 + "\n", "column time: is 'Mean', not a number"),
     "a winch without speed": (lambda f: text_of(f.rename(columns={"winch_speed_2": "v2"})), "winch_speed_2 is missing"),
     "a second column of a name": (lambda f: text_of(f.rename(columns={"y": "x"})), "'x' appears twice"),
@@ -380,7 +381,7 @@ def test_one_speed_that_is_missing_is_interpolated_and_told(tmp_path: Path) -> N
     assert recording.winch_speed[100, 1] == pytest.approx(neighbours, rel=1e-12)
 
 
-@pytest.mark.parametrize("word", ["NULL", "#N/A", "n/a", "-", "-nan(ind)", "1.#QNAN", "NaN "])
+@pytest.mark.parametrize("word", ["NULL", "#N/A", "n/a", "-", "-nan(ind)", "1.#QNAN", "NaN ", "---", "#NV", "#DIV/0!", "1.#QNAN0"])
 def test_what_programs_write_for_a_missing_number_is_one(word: str, tmp_path: Path) -> None:
     laboratory, frame = Laboratory(tmp_path), standard().astype(object)
     frame.loc[200:229, AXES] = word

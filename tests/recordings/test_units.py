@@ -34,6 +34,12 @@ def test_a_unit_may_stand_in_brackets_and_with_either_micro_sign(text: str) -> N
     assert unit is not None and unit.symbol == "us"
 
 
+@pytest.mark.parametrize("text", ["mm/sec", "[mm/sec]", "in/sec", "m/sec"])
+def test_a_second_may_be_sec(text: str) -> None:
+    unit = find_unit(text, "winch_speed_1")
+    assert unit is not None and unit.symbol == text.strip("[]").removesuffix("ec")
+
+
 @pytest.mark.parametrize(("text", "column"), [("S", "time"), ("MN", "tension_1"), ("m", "winch_speed_1"), ("N", "x")])
 def test_units_are_not_guessed(text: str, column: str) -> None:
     with pytest.raises(RecordingError, match=rf"fit\.csv: line 2, column {column}: is in '{text}', not a known unit"):

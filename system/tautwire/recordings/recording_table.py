@@ -191,7 +191,10 @@ MIN_PLACEHOLDER = 1e30  # what programs write for a number that is missing, as t
 MAX_MAGNITUDE = 1e12  # beyond any quantity of a cable robot in SI units
 # What loggers, spreadsheets and databases write where a sensor dropped out.
 _NOT_A_NUMBER = ("nan", "NaN", "NAN", "-nan", "-NaN", "-nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND")
-MISSING_CELLS = ("", *_NOT_A_NUMBER, "NA", "N/A", "n/a", "#N/A", "<NA>", "NULL", "null", "None", "-", "--")
+# As C writes it on Windows in six digits, and spreadsheets in English, German and French where a formula fails.
+_OF_FORMULAS = ("1.#QNAN0", "-1.#IND00", "#N/A", "#NV", "#N/D", "#DIV/0!", "#VALUE!", "#WERT!", "#VALEUR!")
+_WORDS = ("NA", "N/A", "n/a", "N.A.", "<NA>", "NULL", "null", "None", "nil")
+MISSING_CELLS = ("", *_NOT_A_NUMBER, *_OF_FORMULAS, *_WORDS, *("-" * count for count in range(1, 7)))
 # A time beyond this many seconds is an epoch in a smaller unit; in s, epochs of today are 1.8e9.
 _MAX_EPOCH = 1e10
 # Counters of times, and the largest step of one that begins anew, in its period.
@@ -263,7 +266,8 @@ def _width_error(row: Row, width: int) -> RecordingError:
     hint = "complete the line or remove it"
     if len(row.cells) > width:
         hint = "write numbers with a decimal point, and one cell for each column"
-    return RecordingError(row.where, f"has {len(row.cells)} cells, the header has {width}", hint, row.number)
+    cells = "1 cell" if len(row.cells) == 1 else f"{len(row.cells)} cells"
+    return RecordingError(row.where, f"has {cells}, the header has {width}", hint, row.number)
 
 
 def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | RecordingError:

@@ -146,7 +146,7 @@ def find_unit(text: str, column: str) -> Unit | None:
     """The unit of a known column that is written so, in brackets or not; None where it is not listed."""
     brackets = _BRACKETS.fullmatch(text.strip())
     bare = text.strip() if brackets is None else (brackets.group(1) or brackets.group(2) or "").strip()
-    symbol = bare.translate(_MICRO_SIGNS)
+    symbol = re.sub(r"(?<=/)sec$", "s", bare.translate(_MICRO_SIGNS))
     symbol = _OTHER_SPELLINGS.get(symbol, symbol)
     symbol = symbol if brackets is None else _IN_WORDS.get(symbol.lower(), symbol)
     return next((unit for unit in UNITS[quantity_of(column)] if unit.symbol == symbol), None)
