@@ -489,6 +489,14 @@ def test_a_correct_recording_of_poses_is_not_refused(robot: Robot, start: str) -
     assert check is not None and check.misfit < 0.004
 
 
+def test_a_platform_outside_of_its_robot_is_no_measure_of_motion() -> None:
+    # Ropes to a platform in mm hardly change in length by what it moves across them.
+    shown = both(speeds(1.08), positions(1e3))(noisy(wandering_recording(CRANE)))
+    check = check_motion(CRANE, shown)
+    assert check is not None and check.misfit == pytest.approx(1.0, abs=0.02)
+    assert [mistake.cause for mistake in check.readings[0].mistakes] == ["x, y, z are in mm"]
+
+
 @pytest.mark.validate
 @pytest.mark.parametrize("gain", [0.92, 1.08])
 def test_drums_of_rigid_platforms_are_not_taken_for_mistakes(gain: float) -> None:

@@ -331,6 +331,12 @@ def test_blocks_that_span_a_gap_do_not_count() -> None:
     assert check is not None and check.misfit < 0.01
 
 
+def test_nothing_is_said_of_a_platform_outside_of_its_robot() -> None:
+    robot, recording = shipped("three")
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(recording.position.shape)
+    assert recording_mistakes(robot, replace(recording, position=noise + [29.0, 0.0, 1e3])) == ()
+
+
 def test_nothing_is_said_of_too_little() -> None:
     robot, recording = shipped("three")
     assert checked(robot, tensions(recording, np.nan)) is None

@@ -24,7 +24,7 @@ from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MAX_MISFIT, MIN_IMPR
 from .mistaken_orientation import start_orientation_error
 from .mistaken_points import PointMistake, point_mistake
 from .mistaken_tensions import check_tensions
-from .motion_regression import centred, dynamic_amplification, length_regression, moving_rows
+from .motion_regression import centred, dynamic_amplification, length_regression, moving_rows, robot_size
 from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 from .standing_winches import all_winches_stand
@@ -105,7 +105,9 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return (error,)
     elif motion is not None and _is_hopeless(robot, recording, motion):
         errors.append(unexplained_error(recording, motion))
-    if robot.formulas or declared & EFFECTS_ON_FORCES:
+    # Of a platform outside of its robot ropes have no directions: that is told first, and by its start.
+    is_outside = not errors and _distance_of_first(robot, recording) > robot_size(robot)
+    if robot.formulas or declared & EFFECTS_ON_FORCES or is_outside:
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
@@ -265,17 +267,16 @@ def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
     return _rms(reeled_length[inliers]), _rms(errors[inliers])
 
 
-def robot_size(robot: Robot) -> float:
-    """The largest distance between two of the exit points and the start, in m."""
-    points = np.array([*robot.anchors, robot.platform.start])
-    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=2)))
-
-
 def _starts_far_away(robot: Robot, recording: Recording) -> bool:
     """Whether positions begin where :func:`require_matching_reeling` judges, and tells more."""
+    return _distance_of_first(robot, recording) >= MIN_CHECKED_START_SHARE * robot_size(robot)
+
+
+def _distance_of_first(robot: Robot, recording: Recording) -> float:
+    """How far the first positions are from the robot file's start, m; 0 where there are none."""
     first = recording.position[np.isfinite(recording.position[:, robot.axes_in_plane]).all(axis=1)][:ROWS_AT_REST]
-    start = np.where(np.isfinite(first), first, robot.platform.start).mean(axis=0)
-    return _start_distance(robot, start) >= MIN_CHECKED_START_SHARE * robot_size(robot)
+    start = np.where(np.isfinite(first), first, robot.platform.start)
+    return _start_distance(robot, start.mean(axis=0)) if len(start) else 0.0
 
 
 def _start_distance(robot: Robot, start: Array) -> float:

@@ -62,6 +62,9 @@ def rope_motion(robot: Robot, geometry: GeometryReading, poses: RecordedPoses) -
     size = min(platform_size(read), float(np.min(np.linalg.norm(np.array(read.anchors) - read.platform.start, axis=1))))
     angles_squared = np.sum((2.0 * centred(quaternions)) ** 2, axis=1)
     moved = np.sum(centred(positions) ** 2, axis=1) + size**2 * angles_squared
+    # Nor is one outside of its robot, whose ropes hardly change in length by what it moves across them.
+    if np.mean(np.sum((positions - read.platform.start) ** 2, axis=1)) > robot_size(read) ** 2:
+        moved = np.zeros_like(moved)
     return RopeMotion(lengths, robot.cable_count * moved / len(AXES))
 
 
@@ -241,6 +244,12 @@ def _lowest_elastic_frequency(robot: Robot, geometry: GeometryReading) -> float:
     inertia[3:, 3:] = rotation @ np.array(platform.inertia) @ rotation.T
     squares = eigh(structure @ (axial[:, None] * structure.T), inertia, eigvals_only=True)
     return float(np.sqrt(np.min(squares[squares > MIN_STRETCHING_RATIO * squares[-1]])))
+
+
+def robot_size(robot: Robot) -> float:
+    """The largest distance between two of the exit points and the start, in m."""
+    points = np.array([*robot.anchors, robot.platform.start])
+    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=2)))
 
 
 def centred(values: Array) -> Array:
