@@ -381,7 +381,10 @@ def test_one_speed_that_is_missing_is_interpolated_and_told(tmp_path: Path) -> N
     assert recording.winch_speed[100, 1] == pytest.approx(neighbours, rel=1e-12)
 
 
-@pytest.mark.parametrize("word", ["NULL", "#N/A", "n/a", "-", "-nan(ind)", "1.#QNAN", "NaN ", "---", "#NV", "#DIV/0!", "1.#QNAN0"])
+MISSING = ("NULL", "#N/A", "n/a", "-", "-nan(ind)", "1.#QNAN", "NaN ", "---", "#NV", "#DIV/0!", "1.#QNAN0")
+
+
+@pytest.mark.parametrize("word", MISSING)
 def test_what_programs_write_for_a_missing_number_is_one(word: str, tmp_path: Path) -> None:
     laboratory, frame = Laboratory(tmp_path), standard().astype(object)
     frame.loc[200:229, AXES] = word

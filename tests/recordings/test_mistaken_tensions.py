@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tautwire.recordings.alternative_readings import WindingReading
 from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.geometry_reading import GeometryReading
+from tautwire.recordings.mistaken_robot import robot_file_mistakes
 from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.weight_balance import force_balance
@@ -36,6 +37,22 @@ def shipped(name: str) -> tuple[Robot, Recording]:
 
 def tensions(recording: Recording, factor: Any) -> Recording:
     return replace(recording, tension=recording.tension * factor)
+
+
+def stretched_robot() -> Robot:
+    """A platform whose ropes pull from above and below, by 25 times its weight together."""
+    crane = crane_robot()
+    inertia = tuple(tuple(moment / 5.0 for moment in row) for row in crane.platform.inertia or ())
+    cables = [
+        replace(cable, anchor=(*cable.anchor[:2], -2.4)) if number in (1, 2, 5, 6) else cable
+        for number, cable in enumerate(crane.cables, 1)
+    ]
+    platform = replace(crane.platform, mass=crane.platform.mass / 5.0, inertia=inertia)
+    return replace(crane, cables=tuple(cables), platform=platform)
+
+
+def stretched_recording() -> Recording:
+    return noisy(wandering_recording(stretched_robot(), travel=0.2, angle=0.05))
 
 
 def checked(robot: Robot, recording: Recording) -> TensionCheck | None:
@@ -112,6 +129,10 @@ MISTAKES: dict[str, Callable[[Array], Array]] = {
     "other order": lambda tension: tension[:, ::-1],
     "one in kN of the other sign": lambda tension: tension * np.where(np.arange(tension.shape[1]) == 1, -1e-3, 1.0),
     "tared": lambda tension: tension - tension[:10].mean(axis=0),
+    "tared, of the other sign": lambda tension: tension[:10].mean(axis=0) - tension,
+    "tared, in kN": lambda tension: 1e-3 * (tension - tension[:10].mean(axis=0)),
+    "tared, in volts": lambda tension: (tension - tension[:10].mean(axis=0)) / 317.0,
+    "4 to 20 mA": lambda tension: 4.0 + 16.0 * tension / 9000.0,
     "no cell at the last cable, and mN": lambda tension: (
         1e3 * np.where(np.arange(tension.shape[1]) < tension.shape[1] - 1, tension, np.nan)
     ),
@@ -126,9 +147,37 @@ def test_the_told_lines_mend_the_load_cells(tmp_path: Path, name: str, mistake: 
     assert_mended_by_told_lines(robot, replace(recording, tension=MISTAKES[mistake](recording.tension)), tmp_path)
 
 
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("taring", "cause"),
+    [(-1.0, ", and have the other sign"), (1e-3, ", and are in kN"), (1.0 / 317.0, ", and 1 of theirs is about 3")],
+)
+def test_tared_load_cells_are_told_with_their_unit_and_sign(name: str, taring: float, cause: str) -> None:
+    robot, recording = shipped(name)
+    shown = taring * (recording.tension - recording.tension[:10].mean(axis=0))
+    (error,) = recording_mistakes(robot, replace(recording, tension=shown))
+    assert "were tared at the start, where statics gives" in error.problem and f" N{cause}" in error.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("zero", "span"), [(4.0, 16.0), (0.5, 4.0), (32768.0, 32767.0)])
+def test_what_load_cells_show_without_load_is_told_with_their_factor(name: str, zero: float, span: float) -> None:
+    robot, recording = shipped(name)
+    newtons = 8.0 * float(recording.tension.mean())
+    shown = zero + span * recording.tension / newtons
+    (error,) = recording_mistakes(robot, replace(recording, tension=shown))
+    (column,) = told_columns(error.hint).values()
+    assert column["factor"] == pytest.approx(newtons / span, rel=0.08)
+    assert column["offset"] == pytest.approx(zero, abs=0.03 * span)
+
+
 @pytest.mark.parametrize(
     "effects",
-    [{"sensor_gain": {"gain": 1.3, "outputs": "tension", "cables": [2]}}, {"payload": {"mass": 90.0}}],
+    [
+        {"sensor_gain": {"gain": 1.3, "outputs": "tension", "cables": [2]}},
+        {"payload": {"mass": 90.0}},
+        {"sensor_offset": {"force": 400.0}},
+    ],
     ids=str,
 )
 def test_effects_are_not_taken_for_odd_load_cells(effects: dict[str, Any]) -> None:
@@ -144,6 +193,24 @@ def test_one_load_cell_that_was_tared_under_load_is_told_alone() -> None:
     assert "if tension_2 was tared at the start, where statics gives" in error.problem
     (offset,) = (column["offset"] for column in told_columns(error.hint).values())
     assert -offset == pytest.approx(static_tensions(robot)[1], rel=1e-3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_numbers_that_are_no_tensions_are_refused_and_no_ropes_blamed(name: str) -> None:
+    robot, recording = shipped(name)
+    volts = 0.5 + np.linspace(1.2, 2.2, robot.cable_count) * recording.tension / recording.tension.mean(axis=0)
+    shown = replace(recording, tension=volts)
+    (error,) = recording_mistakes(robot, shown)
+    assert "tensions do not match the platform's weight: they carry" in error.problem
+    assert tuple(robot_file_mistakes(robot, shown, "robot.toml")) == ()
+
+
+def test_gains_where_ropes_pull_far_more_than_the_weight_are_left_to_the_trace() -> None:
+    robot = stretched_robot()
+    for below in (1.1, 1.2):
+        gains = np.where(np.array(robot.anchors)[:, 2] > robot.platform.start[2], 0.9, below)
+        check = checked(robot, tensions(stretched_recording(), gains))
+        assert check is not None and check.carried < 0.0 and check.mistakes == () and not check.is_hopeless
 
 
 def test_a_mass_in_pounds_is_told() -> None:
@@ -183,6 +250,15 @@ def test_swapped_load_cells_are_told_beside_gains_that_err_by_some_per_cent() ->
     assert check is not None and 0.015 < check.misfit < 0.03 and check.mistakes == ()
     swapped = replace(erring, tension=erring.tension[:, [0, 2, 1, *range(3, 8)]])
     (error,) = recording_mistakes(robot, swapped)
+    assert "are tension_1, tension_3, tension_2, tension_4" in error.problem
+
+
+def test_swapped_load_cells_are_told_where_ropes_pull_far_more_than_the_weight() -> None:
+    robot = stretched_robot()
+    erring = tensions(stretched_recording(), 1.0 + 0.01 * np.array([1, -1, -1, 1, 1, -1, 1, -1]))
+    check = checked(robot, erring)
+    assert check is not None and check.misfit > 0.05 and check.mistakes == ()
+    (error,) = recording_mistakes(robot, replace(erring, tension=erring.tension[:, [0, 2, 1, *range(3, 8)]]))
     assert "are tension_1, tension_3, tension_2, tension_4" in error.problem
 
 
@@ -334,7 +410,7 @@ def test_blocks_that_span_a_gap_do_not_count() -> None:
 def test_nothing_is_said_of_a_platform_outside_of_its_robot() -> None:
     robot, recording = shipped("three")
     noise = 1e-3 * np.random.default_rng(1).standard_normal(recording.position.shape)
-    assert recording_mistakes(robot, replace(recording, position=noise + [29.0, 0.0, 1e3])) == ()
+    assert recording_mistakes(robot, replace(recording, position=noise + np.array([29.0, 0.0, 1e3]))) == ()
 
 
 def test_nothing_is_said_of_too_little() -> None:

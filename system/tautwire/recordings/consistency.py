@@ -13,6 +13,7 @@ from .alternative_readings import WindingReading
 from .anchor_scale import AnchorScale, anchor_scale
 from .consistency_errors import (
     anchor_error,
+    hopeless_tension_error,
     motion_error,
     odd_winch_error,
     point_error,
@@ -112,6 +113,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
         errors.append(tension_error(recording, tensions))
+    elif tensions is not None and tensions.is_hopeless and not errors:
+        errors.append(hopeless_tension_error(recording, tensions))
     return tuple(errors)
 
 

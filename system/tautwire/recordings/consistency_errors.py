@@ -47,6 +47,16 @@ def tension_error(recording: Recording, tensions: TensionCheck) -> RecordingErro
     return RecordingError(recording.path, problem, remedies)
 
 
+def hopeless_tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:
+    """The error of load cells that carry nothing of the weight, or far more, for no cause that is known."""
+    problem = (
+        f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it, and no unit, "
+        "sign, order, zero or gain that was tried explains it"
+    )
+    hint = "compare each load cell with its calibration, platform.mass (kg) and the anchors; or leave the tensions out"
+    return RecordingError(recording.path, problem, hint)
+
+
 def anchor_error(recording: Recording, scale: AnchorScale) -> RecordingError:
     """The error of exit points or attachments that are all off by one factor."""
     problem = (

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..errors import RobotFileError
 from ..robot.schema import Robot
 from .consistency import EFFECTS_ON_FORCES
+from .load_cell_scale import MAX_UNEXPLAINED, load_cell_scale
 from .recording import Recording
 from .rope_compliance import is_other_rope, rope_compliance
 from .white_noise_estimate import white_noise_deviation
@@ -31,6 +32,10 @@ def robot_file_mistakes(robot: Robot, recording: Recording, file: str) -> Iterat
     """Errors of ropes that stretch several times as much as declared, and of noise that is stated in another unit."""
     yield from _noise_errors(robot, recording, file)
     if robot.formulas or {setting.name for setting in robot.effects} & EFFECTS_ON_STIFFNESS:
+        return
+    cells = load_cell_scale(robot, recording)
+    if cells is not None and abs(cells.carried - 1.0) > MAX_UNEXPLAINED:
+        # Tensions that are none tell nothing of ropes.
         return
     compliance = rope_compliance(robot, recording)
     if compliance is None or not is_other_rope(robot, compliance):

@@ -20,14 +20,18 @@ from .weight_balance import FORCE_UNITS, ForceBalance, force_balance
 
 Array = NDArray[np.float64]
 
-# Whatever the unit, load cells in the right order leave less than the first; in another unit, than the second.
-MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.3
+# Whatever the unit, swapped load cells leave more than the first of the weight, right ones less than the second, of the
+# weight or of tensions that are larger: lifelike platforms on eight cables pull tenfold, and on four leave 0.038; in
+# another unit less than the third.
+MIN_SWAPPED_MISFIT, MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.04, 0.3
 # Standard deviation of the ropes' directions from which on the motion tells one load cell from another.
 MIN_DIRECTION_DEVIATION = 0.01
 EQUAL_RATIO = 1.5
 # How far payloads and gains may be off, and by how much where the unit is of the size of a wrong mass.
 MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("daN", "kg", "lbf")
 MAX_PERMUTED_CABLES = 5
+# Of the weight, whatever payloads and gains do; and of tensions that are larger, by which gains and zeros may be off.
+CARRIED, MAX_GAIN_ERROR = (0.1, 10.0), 0.5
 
 
 @dataclass(frozen=True)
@@ -63,12 +67,16 @@ class TensionReading:
 
 @dataclass(frozen=True)
 class TensionCheck:
-    """Tensions against weight and inertia: the part ``carried``, the misfit as read, and readings that mend it."""
+    """Tensions against weight and inertia: the part ``carried``, the misfit as read, and readings that mend it.
+
+    ``is_hopeless`` where no effect would make tensions of them, whatever is mistaken.
+    """
 
     carried: float
     misfit: float
     corrected_misfit: float
     mistakes: tuple[tuple[Mistake, ...], ...]
+    is_hopeless: bool = False
 
 
 def check_tensions(
@@ -90,11 +98,15 @@ def check_tensions(
     fewest = min((len(tuple(reading.mistakes())) for reading in readings), default=0)
     mistakes = tuple(mistakes for r in readings if len(mistakes := tuple(r.mistakes())) == fewest) if fewest else ()
     corrected_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
-    if not mistakes and is_as_read:
+    if is_as_read:
         cells = likely_cell_readings(robot, recording, balance)
-        mistakes = tuple((cell.mistake,) for cell in cells)
-        corrected_misfit = min((cell.misfit for cell in cells), default=corrected_misfit)
-    return TensionCheck(balance.carried(declared), balance.misfit(declared), corrected_misfit, mistakes)
+        # A unit may be near by chance, one factor is no more than that and a payload.
+        is_chance = bool(cells and cells[0].freedom) and MIN_IMPROVEMENT * cells[0].misfit < corrected_misfit
+        if cells and (is_chance or not mistakes):
+            mistakes, corrected_misfit = tuple((cell.mistake,) for cell in cells), cells[0].misfit
+    carried, misfit = balance.carried(declared), balance.misfit(declared)
+    is_carried = CARRIED[0] < carried < CARRIED[1] or misfit < MAX_GAIN_ERROR * balance.tension_to_weight()
+    return TensionCheck(carried, misfit, corrected_misfit, mistakes, is_as_read and not (is_carried or mistakes))
 
 
 def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
@@ -103,7 +115,9 @@ def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
     misfits = [balance.misfit(order, balance.best_factor(order)) for order in orders]
     best = min(misfits)
     tells_cells_apart = float(np.std(balance.directions, axis=0).max()) > MIN_DIRECTION_DEVIATION
-    if not tells_cells_apart or not best <= MAX_ORDER_MISFIT < misfits[0] or best * MIN_IMPROVEMENT > misfits[0]:
+    factor = balance.best_factor(orders[misfits.index(best)])
+    limit = MAX_ORDER_MISFIT * max(1.0, balance.tension_to_weight(factor))
+    if not tells_cells_apart or best > limit or misfits[0] <= max(MIN_SWAPPED_MISFIT, MIN_IMPROVEMENT * best):
         return orders[:1]
     return [order for order, misfit in zip(orders, misfits, strict=True) if misfit <= EQUAL_RATIO * best]
 
@@ -111,7 +125,7 @@ def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
 def _unit_readings(balance: ForceBalance, order: tuple[int, ...]) -> Iterator[TensionReading]:
     """The unit and sign that the best factor on tensions in this order suggests; none where it is no unit's."""
     factor = balance.best_factor(order)
-    if balance.misfit(order, factor) > MAX_SCALED_MISFIT:
+    if balance.misfit(order, factor) > MAX_SCALED_MISFIT or not balance.pulls(factor):
         return
     for unit, size in FORCE_UNITS.items():
         limit = MAX_NEAR_UNIT_RATIO if unit in NEAR_UNITS else MAX_UNIT_RATIO

@@ -54,26 +54,35 @@ class ForceBalance:
 
     def balanced_tensions(self) -> Array:
         """The balanced tensions nearest to the measured ones, (B, n) in N, NaN where there is no load cell."""
-        unbalanced = self.required - self._forces(tuple(range(len(self.has_load_cell))))
+        unbalanced = self.required - self.forces(tuple(range(len(self.has_load_cell))))
         corrections = np.einsum("bic,bc->bi", np.linalg.pinv(self.directions), unbalanced)
         return np.where(self.has_load_cell, self.tensions + corrections, np.nan)
 
     def carried(self, order: tuple[int, ...]) -> float:
         """The part of the required wrench that the tensions, read in this order, carry; 1 where they are right."""
-        return float(np.sum(self._forces(order) * self.required) / np.sum(self.required**2))
+        return float(np.sum(self.forces(order) * self.required) / np.sum(self.required**2))
 
     def misfit(self, order: tuple[int, ...], factor: float = 1.0) -> float:
         """Rms of what is not balanced, over that of the required wrench."""
-        unbalanced = factor * self._forces(order) - self.required
+        unbalanced = factor * self.forces(order) - self.required
         return float(np.sqrt(np.sum(unbalanced**2) / np.sum(self.required**2)))
 
     def best_factor(self, order: tuple[int, ...]) -> float:
         """The factor on all tensions that balances best; 0 where none does."""
-        forces = self._forces(order)
+        forces = self.forces(order)
         energy = float(np.sum(forces**2))
         return float(np.sum(forces * self.required)) / energy if energy > 0.0 else 0.0
 
-    def _forces(self, order: tuple[int, ...]) -> Array:
+    def pulls(self, factor: float) -> bool:
+        """Whether ropes pull, as they do, where tensions are multiplied by this factor."""
+        return factor * float(self.tensions.sum()) > 0.0
+
+    def tension_to_weight(self, factor: float = 1.0) -> float:
+        """Rms of all tensions together, times a factor, over that of the required wrench."""
+        return abs(factor) * float(np.sqrt(np.sum(self.tensions**2) / np.sum(self.required**2)))
+
+    def forces(self, order: tuple[int, ...]) -> Array:
+        """What the tensions, read in this order, exert, (B, d)."""
         return np.asarray(np.einsum("bci,bi->bc", self.directions, self.tensions[:, order]))
 
 
