@@ -32,6 +32,27 @@ def test_a_load_cell_that_shows_one_value_all_along_is_not_used() -> None:
     assert notes == (f"{WHOLE.path}: tension_2 is constant throughout: not used",)
 
 
+def test_a_load_cell_out_of_its_range_is_not_used_there() -> None:
+    column = WHOLE.tension[:, 1]
+    limit = float(np.round(np.quantile(column, 0.9)))
+    cleaned, notes = without_dead_channels(with_tension(1, np.minimum(column, limit)))
+    assert np.array_equal(np.isnan(cleaned.tension[:, 1]), column >= limit)
+    assert f"tension_2: at its largest value, {limit:.6g} N, in {np.sum(column >= limit)} samples" in notes[0]
+
+
+def test_slack_ropes_and_coarse_steps_are_no_load_cells_out_of_their_range() -> None:
+    column = WHOLE.tension[:, 1]
+    for shown in (np.maximum(column, np.quantile(column, 0.1)), 20.0 * np.round(column / 20.0)):
+        assert np.isfinite(without_dead_channels(with_tension(1, shown))[0].tension[:, 1]).mean() > 0.99
+
+
+def test_a_standstill_under_the_largest_tension_is_not_out_of_range() -> None:
+    still = np.arange(801) < 300
+    tension = np.where(still[:, None], WHOLE.tension.max(axis=0), WHOLE.tension)
+    cleaned, notes = without_dead_channels(replace(WHOLE, tension=tension))
+    assert np.isfinite(cleaned.tension).all() and notes == ()
+
+
 def test_a_load_cell_that_shows_noise_alone_is_not_used() -> None:
     noise = np.random.default_rng(1).normal(scale=2.0, size=801)
     cleaned, notes = without_dead_channels(with_tension(2, 700.0 + noise))

@@ -36,7 +36,7 @@ def test_shipped_robots_are_plausible(name: str) -> None:
         ({"area": 0.2}, "area", "if this is in cm^2 as 2e-05"),
         ({"modulus": 1.5e7}, "modulus", "write it in Pa, if this is in psi as 1.03421e+11"),
         ({"modulus": 1e6, "area": 1e-5}, "modulus", "if this is E A in N as 1e+11"),
-        ({"area": 0.004}, "area", "the diameter in m as 1.257e-05"),
+        ({"area": 0.004}, "area", "the diameter in m as 1.25664e-05"),
         ({"anchor": (0.0, 0.0, 12000.0)}, "anchor", "in mm multiply by 0.001"),
         ({"modulus": 1e9, "damping": 39e9}, "damping", "write it in Pa s"),
         ({"anchor_uncertainty": 2.0}, "anchor_uncertainty", "in mm multiply by 0.001"),
@@ -96,6 +96,28 @@ def test_a_diameter_is_told_where_its_area_is_not(diameter: float, load: float) 
         assert list(implausible_units(with_cables(robot, modulus=modulus, area=area), "robot.toml")) == []
         errors = list(implausible_units(with_cables(robot, modulus=modulus, area=diameter), "robot.toml"))
         assert {error.where.split("].")[-1] for error in errors} == {"area"}
+
+
+def test_an_area_in_mm2_that_is_no_diameter_is_told() -> None:
+    light = example("caroca")
+    light = replace(light, platform=replace(light.platform, mass=0.5))
+    errors = list(implausible_units(with_cables(light, area=0.0079), "robot.toml"))
+    assert len(errors) == 3 and all(error.hint.endswith("m^2, if this is in mm^2 as 7.9e-09") for error in errors)
+
+
+@pytest.mark.parametrize(
+    ("name", "mass", "told"),
+    [
+        ("caroca", 600.0, "would stretch all 3 ropes together to the double, E A is "),
+        ("eight", 40.0, "more than the 3.2e+04 N that all 8 ropes together may bear by tension.maximum"),
+    ],
+)
+def test_a_mass_in_g_is_told_and_not_the_ropes(name: str, mass: float, told: str) -> None:
+    robot = example(name)
+    robot = replace(robot, platform=replace(robot.platform, mass=1e3 * mass))
+    (error,) = implausible_units(robot, "robot.toml")
+    assert error.where == "robot.toml: platform.mass" and told in error.problem
+    assert f"if this is in g as {mass:g}, or compare" in error.hint
 
 
 def test_a_thick_rope_of_a_large_crane_is_plausible() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,10 @@ class DeadChannelPolicy:
     # resolution of a fast sensor does not give. Chosen, not calibrated.
     min_repeated_ratio: float = 0.4
     min_even_ratio: float = 0.8
+    # A load cell out of its range: least share of samples at its largest value, and ratio to those at the next one; a
+    # smooth peak in coarse steps has 2.4. Chosen, not calibrated.
+    min_saturated_share: float = 0.01
+    min_saturated_ratio: float = 5.0
 
 
 DEFAULT_DEAD_CHANNEL_POLICY = DeadChannelPolicy()
@@ -58,6 +62,7 @@ def without_dead_channels(
         for index, count in enumerate(_clear_frozen(columns, policy)):
             if count:
                 notes.append(f"{names[index]}: frozen for {count} samples while others move: not used there")
+    notes += _clear_saturated(measured[:, 3:], recording.channel_names[3:], policy)
     if count := _clear_lost_positions(measured[:, :3], recording.wound_lengths(), policy):
         notes.append(f"x, y, z: frozen for {count} samples while winches move: not used there")
     orientation, orientation_notes = _without_dead_orientation(recording, policy)
@@ -170,6 +175,31 @@ def _clear_frozen(columns: Array, policy: DeadChannelPolicy) -> list[int]:
     return counts
 
 
+def _clear_saturated(tensions: Array, names: Sequence[str], policy: DeadChannelPolicy) -> list[str]:
+    """Empty tensions (N, n) that stay at a cell's largest value while others move; returns notes.
+
+    The smallest is left, as slack ropes have it.
+    """
+    notes, original = [], tensions.copy()
+    for index, column in enumerate(original.T):
+        values = np.abs(_finite(column))
+        if not values.size or np.ptp(values) == 0.0:
+            continue
+        is_largest = np.abs(column) == values.max()
+        count, next_value = int(np.sum(is_largest)), values[values < values.max()].max()
+        least = max(policy.min_frozen_samples, policy.min_saturated_share * len(values))
+        is_sharp = count > policy.min_saturated_ratio * int(np.sum(values == next_value))
+        is_held = is_largest & np.append(False, is_largest[:-1])
+        if count >= least and is_sharp and _any_other_moves(original, index, is_held, policy):
+            tensions[is_largest, index] = np.nan
+            value = float(column[is_largest][0])
+            notes.append(
+                f"{names[index]}: at its largest value, {value:.6g} N, in {count} samples while others move, as load "
+                "cells out of their range are: not used there"
+            )
+    return notes
+
+
 def _repeated_stretches(is_repeated: NDArray[np.bool_], min_samples: int) -> Iterator[slice]:
     """Rows of stretches of so many samples at least that repeat the one before."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
@@ -178,7 +208,7 @@ def _repeated_stretches(is_repeated: NDArray[np.bool_], min_samples: int) -> Ite
             yield slice(first, last)
 
 
-def _any_other_moves(columns: Array, index: int, rows: slice, policy: DeadChannelPolicy) -> bool:
+def _any_other_moves(columns: Array, index: int, rows: slice | NDArray[np.bool_], policy: DeadChannelPolicy) -> bool:
     """Whether another channel varies by more than noise in some rows."""
     for other, column in enumerate(columns.T):
         values = _finite(column[rows])

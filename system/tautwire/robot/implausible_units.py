@@ -36,6 +36,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     errors = []
     for number, cable in enumerate(robot.cables, 1):
         errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
+    errors += _weight_errors(robot, file)
     errors += [*_platform_errors(robot, file), *_uncertainty_errors(robot, file), *_gravity_errors(robot, file)]
     errors += _drum_errors(robot, file)
     yield from errors
@@ -49,7 +50,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
 def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterator[RobotFileError]:
     modulus, area = cable.modulus, cable.area
     area_in_m2 = area if area <= MAX_AREA else 1e-6 * area
-    if modulus * area_in_m2 < weight:
+    if modulus * area_in_m2 < weight and not (MODULI[0] <= modulus <= MODULI[1] and area <= MAX_AREA):
         problem = (
             f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to the double"
         )
@@ -88,8 +89,27 @@ def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Itera
     if MIN_THICK_AREA < area <= MAX_AREA and 0.0 < stress < min(MIN_STRESS, MIN_STRAIN * cable.modulus):
         thickness = 2e3 * math.sqrt(area / math.pi)
         problem = f"is {area:g} m^2, a rope {thickness:.0f} mm thick, and some {load:.3g} N are all that it carries"
-        hint = f"write the area in m^2, if this is the diameter in m as {math.pi / 4.0 * area**2:.4g}"
+        meant = {"the diameter in m": math.pi / 4.0 * area**2, "in mm^2": 1e-6 * area}
+        hint = f"write the area in m^2, {_alternatives(meant, tuple(load / stress for stress in STRESSES))}"
         yield _error(file, ("cable", number - 1, "area"), problem, hint)
+
+
+def _weight_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Error for a mass that all ropes together cannot hold: they would stretch to the double, or exceed their bound."""
+    platform, weight = robot.platform, robot.platform.mass * robot.gravity
+    ropes = f"all {robot.cable_count} ropes together"
+    stiffness = sum(cable.modulus * cable.area for cable in robot.cables)
+    bound = robot.cable_count * robot.tension.maximum if robot.tension else math.inf
+    if weight > bound:
+        problem = f"weighs {weight:.4g} N, more than the {bound:.4g} N that {ropes} may bear by tension.maximum"
+    elif weight > stiffness and all(MODULI[0] <= cable.modulus <= MODULI[1] for cable in robot.cables):
+        problem = f"weighs {weight:.4g} N, which would stretch {ropes} to the double, E A is {stiffness:.3g} N"
+    else:
+        return
+    hint = (
+        f"write it in kg, if this is in g as {1e-3 * platform.mass:.6g}, or compare modulus, area and tension.maximum"
+    )
+    yield _error(file, ("platform", "mass"), f"is {platform.mass:g} kg and {problem}", hint)
 
 
 def _gravity_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
