@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from tautwire.recordings.consistency import (
     recording_mistakes,
     reeling_mismatch,
     require_matching_reeling,
+    require_plausible,
     robot_size,
     travel_error,
 )
@@ -161,6 +163,35 @@ def test_commands_tell_of_another_robots_recording(
     assert "28.1 m from the start in the robot file" in said
     assert list(tmp_path.iterdir()) == []
     assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()
+
+
+def test_cables_of_the_robot_file_in_another_order_are_told_by_winches_and_load_cells() -> None:
+    cables = (*THREE.cables[1:], THREE.cables[0])
+    (error,) = recording_mistakes(replace(THREE, cables=cables), of("three"))
+    match = re.search(r"write the \[\[cable\]\] tables of the robot file in the order ([0-9, ]+), as both", error.hint)
+    assert match is not None
+    written = tuple(cables[int(number) - 1] for number in match.group(1).split(","))
+    assert written == THREE.cables
+    assert "or else write into [recording.columns] winch_speed_1" in error.hint and "tension_1 = {" in error.hint
+
+
+@pytest.mark.parametrize("newtons", [1.0, 1e3])
+def test_winches_alone_in_another_order_are_no_order_of_cables(newtons: float) -> None:
+    recording = of("three")
+    shown = replace(recording, winch_speed=recording.winch_speed[:, [1, 2, 0]], tension=recording.tension / newtons)
+    errors = recording_mistakes(THREE, shown)
+    assert len(errors) == (1 if newtons == 1.0 else 2)
+    assert not any("[[cable]]" in error.hint for error in errors)
+
+
+def test_what_mends_several_mistakes_is_told_once() -> None:
+    recording, rows = of("three"), np.r_[0:1500, 300:1500]
+    parts = {key: getattr(recording, key)[rows] for key in ("winch_speed", "tension", "position", "orientation")}
+    twice = replace(recording, time=recording.time[: len(rows)], **parts)
+    with pytest.raises(RecordingError) as caught:
+        require_plausible(THREE, twice)
+    assert caught.value.problem.count("winch travel of cable") > 1
+    assert caught.value.hint == "cut the recording there"
 
 
 @pytest.mark.validate(but=["1.0"])

@@ -293,6 +293,14 @@ def test_a_ratio_that_differs_by_cable_or_in_time_is_no_gear() -> None:
     assert recording_mistakes(robot, speeds([0.647, 0.65, 0.652])(recording)) != ()
 
 
+def test_a_unit_is_told_before_the_factor_near_it_that_fits_a_little_better() -> None:
+    robot, recording = shipped("three")
+    check = check_motion(robot, speeds([1000.0, 1030.0, 1015.0])(recording))
+    assert check is not None
+    told, fitted = (reading.mistakes[0].cause for reading in check.readings)
+    assert told.endswith("are in mm/s") and "are not speeds of ropes in m/s" in fitted
+
+
 def test_an_effect_that_the_robot_file_declares_is_no_mistake() -> None:
     robot, recording = shipped("three")
     moved = another_origin(recording)

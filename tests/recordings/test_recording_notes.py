@@ -63,6 +63,16 @@ def test_other_effects_are_not_taken_for_scales_or_lags(name: str, effects: dict
     assert notes(name, effects) == ()
 
 
+@pytest.mark.parametrize(
+    ("ratios", "is_clock"), [([0.8, 0.8, 0.8], True), ([0.8, 0.8, 0.84], False), ([0.8, 1, 1], False)]
+)
+def test_drums_that_are_off_alike_may_be_times(ratios: list[float], is_clock: bool) -> None:
+    robot = example("three").as_modelled()
+    recording = read_recording(EXAMPLES / "three" / "check.csv", robot.cable_count)
+    (note,) = recording_notes(robot, recording.with_winch_speed(recording.winch_speed * ratios))
+    assert ("or times in another interval" in note) is is_clock
+
+
 @pytest.mark.validate
 def test_a_drum_of_another_radius_on_all_winches_is_told_with_each_factor() -> None:
     (note,) = notes("caroca", {"drum": {"radius_ratio": 0.94}})

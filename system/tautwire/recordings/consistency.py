@@ -13,6 +13,7 @@ from .alternative_readings import WindingReading
 from .anchor_scale import AnchorScale, anchor_scale
 from .consistency_errors import (
     anchor_error,
+    cable_order_error,
     hopeless_tension_error,
     motion_error,
     odd_winch_error,
@@ -66,7 +67,8 @@ def require_plausible(robot: Robot, recording: Recording) -> None:
     """
     mistakes = recording_mistakes(robot, recording)
     if mistakes:
-        problem, hint = ("; ".join(texts) for texts in zip(*((m.problem, m.hint) for m in mistakes), strict=True))
+        texts = zip(*((m.problem, m.hint) for m in mistakes), strict=True)
+        problem, hint = ("; ".join(dict.fromkeys(each)) for each in texts)
         raise RecordingError(recording.path, problem, hint)
 
 
@@ -113,6 +115,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
         errors.append(tension_error(recording, tensions))
+        if tensions.order == winding.order != tuple(sorted(winding.order)):
+            return (cable_order_error(errors, winding.order),)
     elif tensions is not None and tensions.is_hopeless and not errors:
         errors.append(hopeless_tension_error(recording, tensions))
     return tuple(errors)

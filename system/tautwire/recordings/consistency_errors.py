@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from ..errors import RecordingError
 from ..robot.schema import Robot
 from .alternative_readings import mistakes_text
@@ -45,6 +47,14 @@ def tension_error(recording: Recording, tensions: TensionCheck) -> RecordingErro
         f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
     )
     return RecordingError(recording.path, problem, remedies)
+
+
+def cable_order_error(errors: Sequence[RecordingError], order: Sequence[int]) -> RecordingError:
+    """The error of winches and load cells in one other order, which the robot file's cables may have instead."""
+    tables = ", ".join(str(order.index(column) + 1) for column in range(len(order)))
+    problem, hint = ("; ".join(texts) for texts in zip(*((e.problem, e.hint) for e in errors), strict=True))
+    instead = f"write the [[cable]] tables of the robot file in the order {tables}, as both say of it; or else {hint}"
+    return RecordingError(errors[0].where, problem, instead)
 
 
 def hopeless_tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:

@@ -228,7 +228,8 @@ def _best(readings: list[MotionReading], declared_misfit: float) -> tuple[Motion
     equal = [reading for reading in matching if reading.misfit <= limit]
     fewest = min(reading.penalty for reading in equal)
     unique = {reading.mistakes: reading for reading in equal if reading.penalty == fewest}
-    return tuple(sorted(unique.values(), key=lambda reading: reading.misfit))
+    # A factor that was fitted fits a little better than the unit near it.
+    return tuple(sorted(unique.values(), key=lambda each: (each.winding.speed_unit is None, each.misfit)))
 
 
 def _clock_readings(motion: _RecordedMotion) -> Iterator[tuple[WindingReading, float]]:

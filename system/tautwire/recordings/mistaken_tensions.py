@@ -69,13 +69,15 @@ class TensionReading:
 class TensionCheck:
     """Tensions against weight and inertia: the part ``carried``, the misfit as read, and readings that mend it.
 
-    ``is_hopeless`` where no effect would make tensions of them, whatever is mistaken.
+    ``order`` is that of the first of these where they are some of units and orders. ``is_hopeless`` where no effect
+    would make tensions of them, whatever is mistaken.
     """
 
     carried: float
     misfit: float
     corrected_misfit: float
     mistakes: tuple[tuple[Mistake, ...], ...]
+    order: tuple[int, ...] = ()
     is_hopeless: bool = False
 
 
@@ -106,7 +108,9 @@ def check_tensions(
             mistakes, corrected_misfit = tuple((cell.mistake,) for cell in cells), cells[0].misfit
     carried, misfit = balance.carried(declared), balance.misfit(declared)
     is_carried = CARRIED[0] < carried < CARRIED[1] or misfit < MAX_GAIN_ERROR * balance.tension_to_weight()
-    return TensionCheck(carried, misfit, corrected_misfit, mistakes, is_as_read and not (is_carried or mistakes))
+    is_hopeless = is_as_read and not (is_carried or mistakes)
+    order = readings[0].order if readings else ()
+    return TensionCheck(carried, misfit, corrected_misfit, mistakes, order, is_hopeless)
 
 
 def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:

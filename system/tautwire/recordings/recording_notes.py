@@ -17,6 +17,8 @@ from .winch_scales import WinchScale, winch_scales
 
 # Of lifelike recordings the ropes' motion and the winch travel differ by less.
 MAX_USUAL_MISFIT = 0.15
+# Of winches whose times are wrong: lifelike robots' scales then differ by up to 1.3 %.
+MAX_CLOCK_SPREAD = 0.015
 
 
 def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
@@ -28,7 +30,7 @@ def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
     declared = {setting.name for setting in robot.effects}
     lag, scales = _lag_and_scales(robot, recording)
     notes = [_lag_text(lag)] if lag else []
-    notes += [f"{_scales_text(scales)}: {_drums_text(scales)}"] if scales else []
+    notes += [f"{_scales_text(scales)}: {_drums_text(recording, scales)}"] if scales else []
     if not (notes or declared & EFFECTS_ON_POSES):
         unwound = unwound_motion_text(robot, recording)
         notes += [unwound] if unwound else _unexplained_travel(robot, recording)
@@ -82,9 +84,12 @@ def _scales_text(scales: tuple[WinchScale, ...]) -> str:
     return f"rope moves {factors} (+- {max(deviation, 1e-3):.1g}) of what {winches} wound"
 
 
-def _drums_text(scales: tuple[WinchScale, ...]) -> str:
+def _drums_text(recording: Recording, scales: tuple[WinchScale, ...]) -> str:
     drums = "a drum" if len(scales) == 1 else "drums"
-    return f"{drums} of another radius than declared, or another factor of counts; trace tells it as drum"
+    factors = [scale.factor for scale in scales]
+    is_of_all = len(factors) == recording.cable_count and np.ptp(factors) <= MAX_CLOCK_SPREAD * np.mean(factors)
+    clock = ", or times in another interval" if is_of_all and not recording.rope_lengths else ""
+    return f"{drums} of another radius than declared, or another factor of counts{clock}; trace tells it as drum"
 
 
 def _load_cell_text(scale: LoadCellScale) -> str:

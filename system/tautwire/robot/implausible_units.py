@@ -147,7 +147,8 @@ def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     frame = _frame_radius(robot)
     if radius > frame:
         problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {frame:.3g}"
-        hint = "write it in kg m^2, if this is in kg cm^2 multiply by 1e-4, in kg mm^2 by 1e-6, in g cm^2 by 1e-7"
+        units = "if this is in kg cm^2 multiply by 1e-4, in kg mm^2 by 1e-6, in g cm^2 by 1e-7"
+        hint = f"write it in kg m^2, {units}; and the mass in kg"
         yield _error(file, ("platform", "inertia"), problem, hint)
 
 
