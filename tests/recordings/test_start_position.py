@@ -131,6 +131,13 @@ def test_the_turned_start_has_to_be_held() -> None:
         start_pose(robot, NOISE, replace(recording, orientation=turned))
 
 
+def test_a_platform_that_cannot_be_held_may_be_shown_by_another_point() -> None:
+    recording = noisy(wandering_recording(CRANE))
+    with pytest.raises(UnreachableError) as e:
+        start_pose(CRANE, NOISE, replace(recording, position=recording.position + np.array([0.0, 0.0, 3.9])))
+    assert "another point of the platform than its origin, give attachments from there" in e.value.hint
+
+
 def test_statics_decides_how_a_platform_on_four_cables_starts_turned() -> None:
     robot = suspended_robot(4)
     recording = wandering_recording(robot, travel=0.0)

@@ -124,7 +124,10 @@ def _require_holdable(robot: Robot, recording: Recording, described: str = "") -
     except UnreachableError as error:
         where = f"{recording.path}: first {'positions' if described else 'orientations'}"
         reason = f"{described}{error.reason}"
-        raise UnreachableError(where, error.position, error.cable, error.tension, reason, CONSISTENCY_HINT) from error
+        hint = CONSISTENCY_HINT
+        if described and robot.platform.is_rigid_body:
+            hint += "; if the tracker shows another point of the platform than its origin, give attachments from there"
+        raise UnreachableError(where, error.position, error.cable, error.tension, reason, hint) from error
 
 
 def _start_orientation(robot: Robot, recording: Recording) -> tuple[Quaternion, tuple[str, ...]]:
