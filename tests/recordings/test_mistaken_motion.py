@@ -194,6 +194,15 @@ def test_anchors_with_another_origin_than_the_start_are_told() -> None:
     assert "another origin, about [-28" in error.problem and "subtract it from the anchors" in error.hint
 
 
+def test_anchors_and_positions_in_mm_are_told_beside_speeds_in_metres() -> None:
+    robot, recording = shipped("three")
+    cables = tuple(replace(c, anchor=tuple(1e3 * x for x in c.anchor)) for c in robot.cables)
+    start = tuple(1e3 * x for x in robot.platform.start)
+    in_mm = replace(robot, cables=cables, platform=replace(robot.platform, start=start))
+    error, *_ = recording_mistakes(in_mm, positions(1e3)(recording))
+    assert "if x, y, z are in mm and anchors in the robot file are in mm" in error.problem
+
+
 @pytest.mark.parametrize("with_start", [False, True])
 def test_anchors_in_mm_are_told(with_start: bool) -> None:
     robot, recording = shipped("caroca")

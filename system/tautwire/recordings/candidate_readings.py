@@ -41,6 +41,8 @@ def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
             yield GeometryReading(unit, "m", axes, signs)
     for unit in ANCHOR_UNITS[1:]:
         yield GeometryReading(anchor_unit=unit)
+    if not robot.platform.is_rigid_body:
+        yield GeometryReading("mm", anchor_unit="mm")
     for unit, odd_axis, odd_unit in product(LENGTH_UNITS, robot.axes_in_plane, LENGTH_UNITS):
         if unit != odd_unit and (unit == "m" or len(robot.axes_in_plane) > PLANE):
             yield GeometryReading(unit, odd_axis=odd_axis, odd_unit=odd_unit)
@@ -104,6 +106,9 @@ def _is_of_gear(lengths: Array, wound: Array, ratio: float) -> bool:
 
 def are_of_one_system(geometry: GeometryReading, winding: WindingReading) -> bool:
     """Whether positions and winches may be in these units at once: rare ones of both only where they are alike."""
+    if geometry.position_unit == geometry.anchor_unit != "m":
+        # The winches' scale is then that of anchors and positions.
+        return winding.factor == 1.0
     if geometry.attachment_unit != "m":
         # Beside distant anchors, poses and winches in a thousandth of the unit fit almost as well.
         return winding.factor == 1.0
