@@ -2,15 +2,17 @@
 
 import subprocess
 from collections.abc import Sequence
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, run_cosimulation
-from tautwire.estimation.cosimulation_validation import cosimulate_data_set
+from tautwire.estimation.cosimulation_validation import cosimulate_data_set, largest_chance_errors, noise_floor
 from tautwire.estimation.estimation_data import DataSet
+from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.fmus.native import c_toolchain
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.robot.schema import EffectSetting
@@ -33,6 +35,38 @@ def by_python(monkeypatch: pytest.MonkeyPatch) -> CosimulationResult:
     with monkeypatch.context() as patched:
         patched.setattr("tautwire.fmus.native.native_archive.find_toolchain", no_toolchain)
         return motion()
+
+
+def test_errors_of_noise_and_of_one_random_walk_are_within_chance_in_98_of_100_recordings() -> None:
+    """Its tensions hang on one walk, which over a run is 1.5 times as large as expected in a tenth of them."""
+    recording = recorded("three", 3)
+    count = recording.sample_count
+    data = DataSet(recording, ROBOT.platform.start, np.full(count, True))
+    white, walk = 0.2, 1.0
+    variances = np.tile(white**2 + walk**2 * np.linspace(0.0, 1.0, count)[:, None], (1, 6))
+    noise = SimpleNamespace(white_variances=lambda cable_count: np.full(3 + cable_count, white**2))
+    fitter = cast("Any", SimpleNamespace(noise=noise, open_loop_variances=lambda robot, data: variances))
+    limits = largest_chance_errors(fitter, ROBOT, data, DEFAULT_POLICY.cosimulation)
+    floor = noise_floor(fitter, ROBOT, data)
+    random = np.random.default_rng(1)
+    within, near = 0, 0
+    for _ in range(400):
+        drift = walk * np.cumsum(random.standard_normal(count)) / count**0.5
+        errors = drift[:, None] + white * random.standard_normal((count, 3))
+        tension_rms = float(np.sqrt(np.mean(errors**2)))
+        within += tension_rms <= limits.tension_rms
+        near += tension_rms <= 1.5 * floor.tension_rms
+    assert within >= 392
+    assert near < 380
+
+
+def test_white_noise_alone_is_half_again_as_large_at_most() -> None:
+    recording = recorded("three", 3).first(100)
+    data = DataSet(recording, ROBOT.platform.start, np.full(100, True))
+    noise = SimpleNamespace(white_variances=lambda cable_count: np.full(3 + cable_count, 4.0))
+    fitter = cast("Any", SimpleNamespace(noise=noise, open_loop_variances=lambda robot, data: np.full((100, 6), 4.0)))
+    limits = largest_chance_errors(fitter, ROBOT, data, DEFAULT_POLICY.cosimulation)
+    assert (limits.position_rms, limits.tension_rms) == pytest.approx((3.0, 3.0))
 
 
 @pytest.mark.validate
