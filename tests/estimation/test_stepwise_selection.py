@@ -521,3 +521,37 @@ def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
     found = found_in(robot, *pair("three", 3, {"damping": {"damping": 9e8}}))
     assert [h.effect.name for h in found.accepted] == ["damping"]
     assert found.fit.robot.effects[0].values["damping"] == pytest.approx(9e8, rel=0.05)
+
+
+@pytest.mark.parametrize("ends", ["", "while it compares", "while it scores"])
+def test_a_first_round_is_kept_where_time_ends_before_another_interpolation_is_scored(
+    monkeypatch: pytest.MonkeyPatch, ends: str
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    other = replace(context.split, notes=("cubic",))
+    fit = Fit.without_parameters(robot)
+    first, second = ([CandidateScore(Hypothesis(BY_NAME[n], (1,)), fit, 9.0, 1.5)] for n in ("creep", "damping"))
+
+    def likelier(context: IdentificationContext, scores: list[CandidateScore]) -> Any:
+        if ends == "while it compares":
+            raise OutOfTimeError(600.0)
+        return other
+
+    def score(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+        assert context.split is other
+        if ends == "while it scores":
+            context.leave_untried("fits")
+        return second, True
+
+    monkeypatch.setattr(stepwise_selection, "likelier_interpolation", likelier)
+    monkeypatch.setattr(stepwise_selection, "score_candidates", score)
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter)
+    selection.complete_rounds[(), None] = first
+    scores, _ = selection._likelier_scores(1, first, True)
+    assert scores == (first if ends else second)
+    assert selection.split is (None if ends else other)
+    assert selection.context.split is (context.split if ends else other)
+    assert bool(selection.complete_rounds) == bool(ends)
+    assert bool(context.time_limit.untried) == bool(ends)

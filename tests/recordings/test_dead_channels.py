@@ -53,6 +53,17 @@ def test_a_standstill_under_the_largest_tension_is_not_out_of_range() -> None:
     assert np.isfinite(cleaned.tension).all() and notes == ()
 
 
+def test_a_robot_that_rests_at_both_ends_keeps_a_cell_whose_steps_are_larger_than_its_noise() -> None:
+    """Its largest value is that of home, about which the other cells have hysteresis."""
+    rows = np.arange(801)[:, None]
+    moved = np.where((rows > 250) & (rows < 550), 300.0 * np.sin(np.pi * (rows - 250) / 300.0), 0.0)
+    hysteresis = np.where(rows < 400, 0.0, 40.0) * np.array([1.0, 0.0, 1.0])
+    noise = np.random.default_rng(1).normal(scale=0.02, size=(801, 3))
+    tension = np.round((1000.0 - moved + hysteresis + noise) / 0.5) * 0.5
+    cleaned, notes = without_dead_channels(replace(WHOLE, tension=tension))
+    assert np.isfinite(cleaned.tension[:, 1]).mean() > 0.99, notes
+
+
 def test_a_load_cell_that_shows_noise_alone_is_not_used() -> None:
     noise = np.random.default_rng(1).normal(scale=2.0, size=801)
     cleaned, notes = without_dead_channels(with_tension(2, 700.0 + noise))

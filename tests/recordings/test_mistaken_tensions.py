@@ -205,6 +205,15 @@ def test_numbers_that_are_no_tensions_are_refused_and_no_ropes_blamed(name: str)
     assert tuple(robot_file_mistakes(robot, shown, "robot.toml")) == ()
 
 
+def test_load_cells_with_zeros_of_their_own_are_left_to_the_trace() -> None:
+    """As large as one and a half times their tensions."""
+    robot, recording = shipped("three")
+    random = np.random.default_rng(1)
+    for _ in range(12):
+        zeros = 1.5 * recording.tension.mean() * random.standard_normal(3)
+        assert recording_mistakes(robot, replace(recording, tension=recording.tension + zeros)) == ()
+
+
 def test_gains_where_ropes_pull_far_more_than_the_weight_are_left_to_the_trace() -> None:
     robot = stretched_robot()
     for below in (1.1, 1.2):

@@ -108,7 +108,7 @@ def test_an_area_in_mm2_that_is_no_diameter_is_told() -> None:
 @pytest.mark.parametrize(
     ("name", "mass", "told"),
     [
-        ("caroca", 600.0, "would stretch all 3 ropes together to the double, E A is "),
+        ("caroca", 600.0, "would stretch all 3 ropes together to twice their length (E A is "),
         ("eight", 40.0, "more than the 3.2e+04 N that all 8 ropes together may bear by tension.maximum"),
     ],
 )
@@ -118,6 +118,16 @@ def test_a_mass_in_g_is_told_and_not_the_ropes(name: str, mass: float, told: str
     (error,) = implausible_units(robot, "robot.toml")
     assert error.where == "robot.toml: platform.mass" and told in error.problem
     assert f"if this is in g as {mass:g}, or compare" in error.hint
+
+
+def test_areas_that_were_converted_twice_are_told_and_not_the_mass() -> None:
+    robot = example("caroca")
+    first, *others = robot.cables
+    (error,) = implausible_units(replace(robot, cables=(replace(first, area=1e-6 * first.area), *others)), "robot.toml")
+    assert error.where == "robot.toml: cable[1].area"
+    assert error.hint == f"write it in m^2, if it was converted from mm^2 twice as {first.area:g}"
+    (error,) = implausible_units(with_cables(robot, area=1e-6 * first.area), "robot.toml")
+    assert error.hint == "write it in kg, or compare modulus, area and tension.maximum"
 
 
 def test_a_thick_rope_of_a_large_crane_is_plausible() -> None:

@@ -45,6 +45,7 @@ from .hypotheses import (
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter, NoFitError
 from .selection_result import SelectionResult
+from .time_limit import OutOfTimeError
 
 RADIUS_FORM = ("radius_ratio",)
 
@@ -57,8 +58,12 @@ def with_values_of_cables(
         if shared.form not in PLATFORM_SENSOR_FORMS and len(shared.cables) > 1:
             with suppress(UnreachableError, NoFitError):
                 context, selection = _with_values_of(context, selection, shared)
-    with suppress(UnreachableError, NoFitError):
+    try:
         return _with_kinematic_radii(context, selection)
+    except OutOfTimeError:
+        context.leave_untried("radii of drums by kinematics")
+    except (UnreachableError, NoFitError):
+        pass
     return context, selection
 
 
@@ -118,25 +123,32 @@ def _unseen_gain(
 def _with_kinematic_radii(
     context: IdentificationContext, selection: SelectionResult
 ) -> tuple[IdentificationContext, SelectionResult]:
-    """The selection with the radius of each drum as kinematics alone have it, where no tension was measured."""
+    """The selection with the radius of each drum as kinematics alone have it, where no tension was measured.
+
+    Beside the other effects that were selected; none of the drums' radii where kinematics do not tell all of them.
+    """
     split, accepted = context.split, selection.accepted
     drums = [hypothesis for hypothesis in accepted if hypothesis.effect is DRUM]
-    if not drums or any(data.recording.has_tension for data in (split.estimation, split.validation)):
+    is_declared = any(setting.name == DRUM.name for setting in context.robot.effects)
+    has_tension = any(data.recording.has_tension for data in (split.estimation, split.validation))
+    if not drums or is_declared or has_tension:
         return context, selection
-    scales = {scale.cable: scale for scale in kinematic_scales(context.robot, split.estimation.recording)}
+    others = tuple(setting for setting in selection.fit.robot.effects if setting.name != DRUM.name)
+    counted = split.estimation.first(int(np.sum(split.estimation.rows))).recording
+    scales = {scale.cable: scale for scale in kinematic_scales(replace(context.robot, effects=others), counted)}
     if any(drum.form != RADIUS_FORM or not scales.keys() >= set(drum.cables) for drum in drums):
         return context, selection
     chosen = tuple(each for old in accepted for each in ((split_by_cable([old]) or [old]) if old in drums else [old]))
     fitter, fit = _fit_beside_radii(context, reduce(_separated, drums, selection.fit.robot), chosen, scales)
     gain = _unseen_gain(context, (context.fitter, selection.fit.robot, accepted), (fitter, fit.robot, chosen))
     evidence = {cable: e for h, e in zip(accepted, selection.evidence, strict=True) if h in drums for cable in h.cables}
-    if gain < -context.policy.selection.min_cable_evidence_ratio * max(evidence.values()):
+    if not gain >= -context.policy.selection.min_cable_evidence_ratio * max(evidence.values()):
         return context, selection
-    others = {h: e for h, e in zip(accepted, selection.evidence, strict=True) if h not in drums}
+    kept = {h: e for h, e in zip(accepted, selection.evidence, strict=True) if h not in drums}
     kinematic = replace(
         selection,
         accepted=chosen,
-        evidence=tuple(others[h] if h in others else evidence[h.cables[0]] for h in chosen),
+        evidence=tuple(kept[h] if h in kept else evidence[h.cables[0]] for h in chosen),
         fit=fit,
         disturbance=fitter.noise.disturbance,
     )
@@ -146,7 +158,10 @@ def _with_kinematic_radii(
 def _fit_beside_radii(
     context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis], scales: Mapping[int, WinchScale]
 ) -> tuple[Fitter, Fit]:
-    """The disturbance, and the chosen hypotheses, fitted to FIT with the drums' radii held at the winches' scales."""
+    """The disturbance, and the chosen hypotheses, fitted to FIT with the drums' radii held at the winches' scales.
+
+    The covariance of other parameters is that given these radii.
+    """
     estimation = context.split.estimation
     free = free_parameters(robot, chosen)
     cables = {each: robot.effects[each.effect_index].cables for each in free}

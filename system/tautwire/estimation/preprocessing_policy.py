@@ -85,8 +85,8 @@ class PreprocessingPolicy:
     # Nats on FIT from which winch speeds are central differences of counts. Of seven lifelike recordings from counts
     # three gained 110, 190 and 3,200; the others nothing, or lost up to 1,600 where counts are coarse.
     min_speed_gain: float = 20.0
-    # The same as a share of what squared innovations exceed white noise by, in nats: beside a disturbance next to
-    # nothing, without one much where an effect is hidden. Chosen, not calibrated.
+    # The same as a share of the nats that the model misses: beside a disturbance next to nothing, without one much
+    # where an effect is hidden. Chosen, not calibrated.
     min_speed_gain_to_misfit: float = 0.1
     # Nats for each measured number from which winch speeds are cubic between samples before effects are known. True
     # linear ones were 0.001 less likely beside hidden friction, true cubic ones 0.008 beside hidden damping. Under the

@@ -105,9 +105,8 @@ class _StepwiseSelection:
             number = self._next_number()
             search_round = _search_round(self.context, number, self.current.robot, self.accepted)
             scores, is_complete = score_candidates(self.context, search_round)
-            if not self.accepted and self._interpolates_otherwise(scores):
-                search_round = _search_round(self.context, number, self.current.robot, self.accepted)
-                scores, is_complete = score_candidates(self.context, search_round)
+            if not self.accepted:
+                scores, is_complete = self._likelier_scores(number, scores, is_complete)
             if is_complete:
                 self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
@@ -124,12 +123,25 @@ class _StepwiseSelection:
             if self.accepted == before:
                 break
 
-    def _interpolates_otherwise(self, scores: Sequence[CandidateScore]) -> bool:
-        """Interpolate winch speeds otherwise where a first round shows them likelier so; tells whether it does."""
-        split = likelier_interpolation(self.context, scores)
-        if split is not None:
-            self.context, self.split = replace(self.context, split=split), split
-        return split is not None
+    def _likelier_scores(
+        self, number: int, scores: list[CandidateScore], is_complete: bool
+    ) -> tuple[list[CandidateScore], bool]:
+        """Scores of a first round with the likelier interpolation of winch speeds; as they are where time ends."""
+        untried = self.context.time_limit.untried
+        try:
+            split = likelier_interpolation(self.context, scores)
+            if split is None:
+                return scores, is_complete
+            context = replace(self.context, split=split)
+            others = score_candidates(context, _search_round(context, number, self.current.robot, ()))
+        except OutOfTimeError:
+            self.context.leave_untried("winch speeds interpolated otherwise")
+            return scores, is_complete
+        if context.time_limit.untried != untried:
+            return scores, is_complete
+        self.context, self.split = context, split
+        self.complete_rounds.clear()
+        return others
 
     def _next_number(self) -> int:
         """Number of the round that follows those with candidates."""

@@ -63,7 +63,10 @@ def hopeless_tension_error(recording: Recording, tensions: TensionCheck) -> Reco
         f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it, and no unit, "
         "sign, order, zero or gain that was tried explains it"
     )
-    hint = "compare each load cell with its calibration, platform.mass (kg) and the anchors; or leave the tensions out"
+    hint = (
+        "compare each load cell with its calibration, platform.mass (kg) and the anchors, and see whether a spring, a "
+        "counterweight or a guide carries the platform; or leave the tensions out"
+    )
     return RecordingError(recording.path, problem, hint)
 
 

@@ -189,8 +189,12 @@ def _clear_saturated(tensions: Array, names: Sequence[str], policy: DeadChannelP
         count, next_value = int(np.sum(is_largest)), values[values < values.max()].max()
         least = max(policy.min_frozen_samples, policy.min_saturated_share * len(values))
         is_sharp = count > policy.min_saturated_ratio * int(np.sum(values == next_value))
+        # A cell whose steps are larger than its noise repeats a value wherever it rests.
+        below = np.where(is_largest, np.nan, column)
+        is_fine = white_noise_deviation(_finite(below)[:, None]) > float(np.min(np.diff(np.unique(values))))
         is_held = is_largest & np.append(False, is_largest[:-1])
-        if count >= least and is_sharp and _any_other_moves(original, index, is_held, policy):
+        is_clipped = count >= least and is_sharp and is_fine
+        if is_clipped and _any_other_moves(original, index, is_held, policy):
             tensions[is_largest, index] = np.nan
             value = float(column[is_largest][0])
             notes.append(

@@ -35,7 +35,7 @@ def robot_file_mistakes(robot: Robot, recording: Recording, file: str) -> Iterat
         return
     cells = load_cell_scale(robot, recording)
     if cells is not None and abs(cells.carried - 1.0) > MAX_UNEXPLAINED:
-        # Tensions that are none tell nothing of ropes.
+        # Numbers that are no tensions tell nothing of ropes.
         return
     compliance = rope_compliance(robot, recording)
     if compliance is None or not is_other_rope(robot, compliance):

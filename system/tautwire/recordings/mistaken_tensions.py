@@ -20,18 +20,20 @@ from .weight_balance import FORCE_UNITS, ForceBalance, force_balance
 
 Array = NDArray[np.float64]
 
-# Whatever the unit, swapped load cells leave more than the first of the weight, right ones less than the second, of the
-# weight or of tensions that are larger: lifelike platforms on eight cables pull tenfold, and on four leave 0.038; in
-# another unit less than the third.
-MIN_SWAPPED_MISFIT, MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.04, 0.3
-# Standard deviation of the ropes' directions from which on the motion tells one load cell from another.
-MIN_DIRECTION_DEVIATION = 0.01
+# What swapped load cells leave at least, of the weight, whatever the unit; and right ones in another unit at most.
+MIN_SWAPPED_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.3
+# What right ones leave at most, of the weight or of larger tensions: lifelike platforms on four cables leave 0.038.
+MAX_ORDER_MISFIT = 0.04
+# Standard deviation of the ropes' directions from which on the motion tells one load cell from another; beside gains
+# of 5 % and large tensions an order in 25 fitted by chance where a planar robot moved by 5 cm, none where by 15 cm.
+MIN_DIRECTION_DEVIATION, MIN_DEVIATION_BESIDE_GAINS = 0.01, 0.025
 EQUAL_RATIO = 1.5
 # How far payloads and gains may be off, and by how much where the unit is of the size of a wrong mass.
 MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("daN", "kg", "lbf")
 MAX_PERMUTED_CABLES = 5
-# Of the weight, whatever payloads and gains do; and of tensions that are larger, by which gains and zeros may be off.
-CARRIED, MAX_GAIN_ERROR = (0.1, 10.0), 0.5
+# Of the weight, whatever payloads and gains do; of tensions that are larger, by which gains and zeros may be off; and
+# the misfit below which zeros of single cells, an effect, explain all.
+CARRIED, MAX_GAIN_ERROR, MAX_MISFIT_BESIDE_ZEROS = (0.1, 10.0), 0.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -69,8 +71,8 @@ class TensionReading:
 class TensionCheck:
     """Tensions against weight and inertia: the part ``carried``, the misfit as read, and readings that mend it.
 
-    ``order`` is that of the first of these where they are some of units and orders. ``is_hopeless`` where no effect
-    would make tensions of them, whatever is mistaken.
+    ``order`` is the order of cells of the first of these. ``is_hopeless`` where neither a mistake nor an effect
+    explains them.
     """
 
     carried: float
@@ -108,8 +110,9 @@ def check_tensions(
             mistakes, corrected_misfit = tuple((cell.mistake,) for cell in cells), cells[0].misfit
     carried, misfit = balance.carried(declared), balance.misfit(declared)
     is_carried = CARRIED[0] < carried < CARRIED[1] or misfit < MAX_GAIN_ERROR * balance.tension_to_weight()
-    is_hopeless = is_as_read and not (is_carried or mistakes)
-    order = readings[0].order if readings else ()
+    is_explained = is_carried or mistakes or balance.explains_beside_zeros(MAX_MISFIT_BESIDE_ZEROS)
+    is_hopeless = is_as_read and not is_explained
+    order = next((r.order for r in readings if len(tuple(r.mistakes())) == fewest), ())
     return TensionCheck(carried, misfit, corrected_misfit, mistakes, order, is_hopeless)
 
 
@@ -118,10 +121,12 @@ def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
     orders = list(_orders(balance))
     misfits = [balance.misfit(order, balance.best_factor(order)) for order in orders]
     best = min(misfits)
-    tells_cells_apart = float(np.std(balance.directions, axis=0).max()) > MIN_DIRECTION_DEVIATION
+    deviation = float(np.std(balance.directions, axis=0).max())
     factor = balance.best_factor(orders[misfits.index(best)])
-    limit = MAX_ORDER_MISFIT * max(1.0, balance.tension_to_weight(factor))
-    if not tells_cells_apart or best > limit or misfits[0] <= max(MIN_SWAPPED_MISFIT, MIN_IMPROVEMENT * best):
+    larger = balance.tension_to_weight(factor) if deviation > MIN_DEVIATION_BESIDE_GAINS else 1.0
+    limit = MAX_ORDER_MISFIT * max(1.0, larger)
+    is_better = misfits[0] > max(MIN_SWAPPED_MISFIT, MIN_IMPROVEMENT * best)
+    if deviation <= MIN_DIRECTION_DEVIATION or best > limit or not is_better:
         return orders[:1]
     return [order for order, misfit in zip(orders, misfits, strict=True) if misfit <= EQUAL_RATIO * best]
 

@@ -110,7 +110,8 @@ def _of_live_zero(balance: ForceBalance) -> Iterator[CellReading]:
         return
     zero, largest = -constant / factor, float(np.abs(balance.tensions).max())
     true = (factor * balance.tensions + constant)[:, balance.has_load_cell]
-    is_effect = MASS_RATIOS[0] < factor < MASS_RATIOS[1] and -constant < np.abs(true).mean()
+    is_newton = 1.0 / MAX_UNIT_RATIO < factor < MAX_UNIT_RATIO
+    is_effect = is_newton or (MASS_RATIOS[0] < factor < MASS_RATIOS[1] and -constant < np.abs(true).mean())
     if is_effect or not MIN_LIVE_ZERO * largest < zero < largest:
         return
     names = [f"tension_{index + 1}" for index, has in enumerate(balance.has_load_cell) if has]

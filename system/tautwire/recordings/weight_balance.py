@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +66,21 @@ class ForceBalance:
         """Rms of what is not balanced, over that of the required wrench."""
         unbalanced = factor * self.forces(order) - self.required
         return float(np.sqrt(np.sum(unbalanced**2) / np.sum(self.required**2)))
+
+    def explains_beside_zeros(self, max_misfit: float) -> bool:
+        """Whether tensions balance to a misfit where each load cell may show a number of its own without load.
+
+        And to half of what is left without them, so that numbers that are no tensions do not.
+        """
+        still = replace(self, tensions=np.zeros_like(self.tensions))
+        return self._misfit_beside_zeros() < min(max_misfit, 0.5 * still._misfit_beside_zeros())
+
+    def _misfit_beside_zeros(self) -> float:
+        directions = self.directions[:, :, np.array(self.has_load_cell)]
+        shapes = directions.reshape(-1, directions.shape[2])
+        unbalanced = (self.required - self.forces(tuple(range(len(self.has_load_cell))))).ravel()
+        zeros = np.linalg.lstsq(shapes, unbalanced, rcond=None)[0]
+        return float(np.linalg.norm(unbalanced - shapes @ zeros) / np.linalg.norm(self.required))
 
     def best_factor(self, order: tuple[int, ...]) -> float:
         """The factor on all tensions that balances best; 0 where none does."""

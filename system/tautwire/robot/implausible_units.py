@@ -36,7 +36,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     errors = []
     for number, cable in enumerate(robot.cables, 1):
         errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
-    errors += _weight_errors(robot, file)
+    errors += list(_weight_errors(robot, file)) or _thin_rope_errors(robot, weight, file)
     errors += [*_platform_errors(robot, file), *_uncertainty_errors(robot, file), *_gravity_errors(robot, file)]
     errors += _drum_errors(robot, file)
     yield from errors
@@ -52,7 +52,8 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
     area_in_m2 = area if area <= MAX_AREA else 1e-6 * area
     if modulus * area_in_m2 < weight and not (MODULI[0] <= modulus <= MODULI[1] and area <= MAX_AREA):
         problem = (
-            f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to the double"
+            f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to twice its "
+            "length"
         )
         meant = {"in GPa": 1e9 * modulus, "in MPa": 1e6 * modulus, "in psi": PSI * modulus}
         meant |= {"E A in N": modulus / area_in_m2}
@@ -94,8 +95,20 @@ def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Itera
         yield _error(file, ("cable", number - 1, "area"), problem, hint)
 
 
+def _thin_rope_errors(robot: Robot, weight: float, file: str) -> Iterator[RobotFileError]:
+    """Error for each rope that its share of the weight would stretch to twice its length, though its modulus may be."""
+    for number, cable in enumerate(robot.cables):
+        if cable.modulus * cable.area < weight and MODULI[0] <= cable.modulus <= MODULI[1] and cable.area <= MAX_AREA:
+            problem = (
+                f"is {cable.area:g} m^2, with which its share of the weight, {weight:.3g} N, would stretch it to twice "
+                "its length"
+            )
+            hint = f"write it in m^2, if it was converted from mm^2 twice as {1e6 * cable.area:g}"
+            yield _error(file, ("cable", number, "area"), problem, hint)
+
+
 def _weight_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
-    """Error for a mass that all ropes together cannot hold: they would stretch to the double, or exceed their bound."""
+    """Error for a mass that all ropes together cannot hold: they would stretch twofold, or exceed their bound."""
     platform, weight = robot.platform, robot.platform.mass * robot.gravity
     ropes = f"all {robot.cable_count} ropes together"
     stiffness = sum(cable.modulus * cable.area for cable in robot.cables)
@@ -103,12 +116,12 @@ def _weight_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     if weight > bound:
         problem = f"weighs {weight:.4g} N, more than the {bound:.4g} N that {ropes} may bear by tension.maximum"
     elif weight > stiffness and all(MODULI[0] <= cable.modulus <= MODULI[1] for cable in robot.cables):
-        problem = f"weighs {weight:.4g} N, which would stretch {ropes} to the double, E A is {stiffness:.3g} N"
+        problem = f"weighs {weight:.4g} N, which would stretch {ropes} to twice their length (E A is {stiffness:.3g} N)"
     else:
         return
-    hint = (
-        f"write it in kg, if this is in g as {1e-3 * platform.mass:.6g}, or compare modulus, area and tension.maximum"
-    )
+    stress = 1e-3 * weight / sum(cable.area for cable in robot.cables)
+    in_g = f"if this is in g as {1e-3 * platform.mass:.6g}, " if stress < STRESSES[1] else ""
+    hint = f"write it in kg, {in_g}or compare modulus, area and tension.maximum"
     yield _error(file, ("platform", "mass"), f"is {platform.mass:g} kg and {problem}", hint)
 
 
