@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tautwire.estimation.hypotheses import Hypothesis, hypotheses, with_larger_forms
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses, searched_hypotheses, with_larger_forms
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.support.rigid_robots import crane_robot
@@ -39,3 +39,10 @@ def test_an_attachment_is_tried_of_one_cable_at_a_time() -> None:
 def test_a_payload_has_a_place_on_a_rigid_body_only(robot: Robot, forms: list[tuple[str, ...]]) -> None:
     larger = with_larger_forms([Hypothesis(BY_NAME["payload"], ())], robot)
     assert [hypothesis.form for hypothesis in larger] == forms
+
+
+@pytest.mark.parametrize("has_disturbance", [False, True])
+def test_a_search_tries_a_payload_beside_the_centre_of_mass_too(has_disturbance: bool) -> None:
+    aside = Hypothesis(BY_NAME["payload"], (), ("mass", "x", "y", "z"))
+    for robot, more in ((crane_robot(), (aside,)), (example("eight"), ())):
+        assert searched_hypotheses(robot, has_disturbance) == (*hypotheses(robot, has_disturbance), *more)

@@ -16,16 +16,32 @@ from tautwire.estimation.disturbance import sensor_noise_only
 from tautwire.estimation.disturbance_posterior import disturbance_prior, logs_of
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.recordings.recording import read_recording
+from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.rigid_recordings import rigid_recording, with_noise
 from tests.support.rigid_robots import octahedral_robot, suspended_robot
+from tests.support.robots import EXAMPLES
 
 OCTAHEDRAL, HANGING = with_noise(octahedral_robot()), with_noise(suspended_robot(4))
 
 
 def damped(robot: Robot, factor: float) -> Robot:
     return replace(robot, cables=tuple(replace(each, damping=factor * each.damping) for each in robot.cables))
+
+
+@pytest.mark.validate
+def test_a_load_beside_the_centre_of_mass_is_named_alone_with_its_place() -> None:
+    """Of a load at the centre sag of all ropes would explain more."""
+    folder = EXAMPLES / "cogiro"
+    robot = read_robot(folder / "robot.toml")
+    fit, check = (read_recording(folder / f"{role}.csv", robot.cable_count) for role in ("fit", "check"))
+    result = trace(robot, fit, check)
+    (payload,) = result.effects
+    assert payload.name == "payload"
+    found = {name: estimate.value for name, estimate in payload.parameters.items()}
+    assert found == pytest.approx({"mass": 5.0, "x": 0.4, "y": 0.3, "z": 0.7}, rel=0.02)
 
 
 @pytest.mark.validate

@@ -8,7 +8,7 @@ from math import inf
 
 from ..robot.schema import EffectSetting, Robot
 from .candidate_scores import CandidateScore
-from .hypotheses import Hypothesis, hypotheses, split_by_cable, with_hypothesis, with_larger_forms
+from .hypotheses import Hypothesis, searched_hypotheses, split_by_cable, with_hypothesis, with_larger_forms
 from .policy import DEFAULT_POLICY, FitPolicy, ScoreTestPolicy, SelectionPolicy
 from .score_test import PredictedGain
 
@@ -57,7 +57,7 @@ class SearchRound:
     def candidates(self, declared: Robot) -> list[Hypothesis]:
         """Hypotheses on the declared robot that could act beside the accepted ones, and without the rival."""
         excluded = [*self.accepted, self.rival.hypothesis] if self.rival else self.accepted
-        tried = hypotheses(declared, self.has_disturbance)
+        tried = searched_hypotheses(declared, self.has_disturbance)
         return [h for h in tried if not any(a.overlaps(h) for a in excluded)]
 
     def tasks(

@@ -5,7 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tautwire_fmu.laws.effects import ALL, ANCHOR, ATTACHMENT, BY_NAME, HANGING_LOAD, STIFFENING, Effect, Parameter
+from tautwire_fmu.laws.effects import (
+    ALL,
+    ANCHOR,
+    ATTACHMENT,
+    BY_NAME,
+    HANGING_LOAD,
+    PAYLOAD,
+    STIFFENING,
+    Effect,
+    Parameter,
+)
 
 from ..robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
@@ -98,6 +108,15 @@ def hypotheses(robot: Robot, has_disturbance: bool = False) -> tuple[Hypothesis,
             if form not in PLATFORM_SENSOR_FORMS:
                 candidates += [Hypothesis(effect, (cable,), form) for cable in robot.cable_numbers]
     return tuple(candidates)
+
+
+def searched_hypotheses(robot: Robot, has_disturbance: bool = False) -> tuple[Hypothesis, ...]:
+    """The hypotheses of a search: :func:`hypotheses`, and a payload beside the centre of mass of a rigid platform.
+
+    A round without it takes what carries a moment, sag of all ropes, for such a load, and never comes back.
+    """
+    larger = with_larger_forms([Hypothesis(PAYLOAD, ())], robot)
+    return (*hypotheses(robot, has_disturbance), *larger)
 
 
 def with_larger_forms(accepted: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:

@@ -9,7 +9,7 @@ from math import log
 
 from ..robot.schema import Robot
 from .estimation_data import DataSet, DataSplit
-from .hypotheses import hypotheses
+from .hypotheses import searched_hypotheses
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, IdentificationPolicy
 from .time_limit import TimeLimit
@@ -55,7 +55,7 @@ class IdentificationContext:
         Beside a disturbance it also has to be more than the disturbance's own form may lack on validation data.
         """
         has_disturbance = self.fitter.has_disturbance
-        by_chance = log((len(hypotheses(self.robot, has_disturbance)) + others) / self.alpha)
+        by_chance = log((len(searched_hypotheses(self.robot, has_disturbance)) + others) / self.alpha)
         if not has_disturbance:
             return by_chance
         return max(by_chance, self.policy.selection.min_evidence_rate * float(self.split.validation.rows.sum()))
