@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import ceil, log2, log10
+from math import ceil, isfinite, log2, log10
 
 import numpy as np
 import pandas as pd
@@ -174,7 +174,8 @@ class _DesignProblem:
         except _InfeasibleError:
             return INFEASIBLE_SCORE
         pairs = self.separations(program)
-        return log10(max(pairs[0].nats, MIN_SEPARATION)) if pairs else INFEASIBLE_SCORE
+        is_known = bool(pairs) and isfinite(pairs[0].nats)
+        return log10(max(pairs[0].nats, MIN_SEPARATION)) if is_known else INFEASIBLE_SCORE
 
     def program(self, decision_variables: Array, shrink_factor: float = SHRINK_FACTOR) -> tuple[Trajectory, Recording]:
         """Decode decision variables between 0 and 1 into a path within the limits, and what sensors show along it."""
