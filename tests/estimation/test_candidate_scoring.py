@@ -176,11 +176,12 @@ def test_a_round_beside_a_disturbance_has_the_shortlist_for_it(
 @pytest.mark.parametrize(
     ("mean_square", "evidence_otherwise", "has_other", "is_otherwise"),
     [
-        (1.5, 1030.0, True, True),
-        (1.5, 1010.0, True, False),
-        (1.5, None, True, False),
+        (1.2, 1030.0, True, True),
+        (1.2, 1010.0, True, False),
+        (9.0, 1030.0, True, False),
+        (1.2, None, True, False),
         (1.0, 1030.0, True, False),
-        (1.5, 1030.0, False, False),
+        (1.2, 1030.0, False, False),
     ],
 )
 def test_winch_speeds_are_interpolated_otherwise_where_the_best_effects_are_far_likelier_so(

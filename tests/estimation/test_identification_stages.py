@@ -186,14 +186,15 @@ def test_a_selection_with_speeds_interpolated_otherwise_brings_its_data(monkeypa
 
 
 @pytest.mark.parametrize(
-    ("as_they_are", "refitted", "explains", "has_disturbance", "is_likelier"),
+    ("as_they_are", "refitted", "explains", "has_disturbance", "misfit", "is_likelier"),
     [
-        (30.0, 30.0, True, False, True),
-        (-500.0, 30.0, False, False, True),
-        (-500.0, 30.0, True, True, True),
-        (-500.0, 30.0, True, False, False),
-        (-500.0, 10.0, False, False, False),
-        (10.0, 30.0, False, False, False),
+        (30.0, 30.0, True, False, 100.0, True),
+        (-500.0, 30.0, False, False, 100.0, True),
+        (-500.0, 30.0, False, False, 1000.0, False),
+        (-500.0, 30.0, True, True, 1000.0, True),
+        (-500.0, 30.0, True, False, 100.0, False),
+        (-500.0, 10.0, False, False, 100.0, False),
+        (10.0, 30.0, False, False, 100.0, False),
     ],
 )
 def test_other_speeds_are_judged_with_effects_fitted_anew_unless_the_residual_is_white(
@@ -202,18 +203,21 @@ def test_other_speeds_are_judged_with_effects_fitted_anew_unless_the_residual_is
     refitted: float,
     explains: bool,
     has_disturbance: bool,
+    misfit: float,
     is_likelier: bool,
 ) -> None:
-    """Gains in nats, of 20 that are needed, and before and after the effects are fitted to the other data."""
+    """Gains in nats before and after the effects are fitted to the other data, of 20 or a tenth of what is missed."""
     state = with_effects("modulus", modulus=0.1)
-    now, other = (SimpleNamespace(estimation=name) for name in ("now", "other"))
+    now, other = (SimpleNamespace(estimation=SimpleNamespace(name=name, rows=None)) for name in ("now", "other"))
     robot = replace(ROBOT, name="refitted")
 
-    def log_likelihood(robot: Any, chosen: object, data: str) -> float:
-        return {"now": 1000.0, "other": 1000.0 + (refitted if robot.name == "refitted" else as_they_are)}[data]
+    def log_likelihood(robot: Any, chosen: object, data: Any) -> float:
+        return 1000.0 + (refitted if robot.name == "refitted" else as_they_are)
 
+    innovations = SimpleNamespace(log_likelihood=lambda rows: 1000.0, misfit=lambda rows: misfit)
     fitter = SimpleNamespace(
         has_disturbance=has_disturbance,
+        judged=lambda *_: innovations,
         log_likelihood=log_likelihood,
         fit_from=lambda *_: SimpleNamespace(robot=robot),
     )

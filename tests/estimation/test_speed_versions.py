@@ -143,7 +143,7 @@ def test_interpolation_is_judged_again_under_the_effects_found(
 ) -> None:
     """It begins with the wrong one."""
     threshold = np.inf if is_smooth else -np.inf
-    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_cubic_gain=threshold, min_speed_gain_to_misfit=threshold)
+    wrong_first = replace(DEFAULT_POLICY.preprocessing, min_cubic_gain=threshold, min_cubic_gain_to_misfit=threshold)
     monkeypatch.setattr(
         identification, "policy_within", lambda seconds: replace(DEFAULT_POLICY, preprocessing=wrong_first)
     )

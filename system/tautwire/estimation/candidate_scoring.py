@@ -77,7 +77,8 @@ def likelier_interpolation(context: IdentificationContext, scores: Sequence[Cand
     label = "winch speeds interpolated otherwise"
     others = fit_candidates(replace(context, split=split), label, tasks, split.estimation, baseline)
     gain = max((score.evidence for score in others.values()), default=-inf) - ranked[0].evidence
-    return split if gain >= context.policy.preprocessing.min_speed_gain else None
+    misfit = 0.5 * (ranked[0].mean_square - 1.0) * value_count
+    return split if gain >= context.policy.preprocessing.decisive_gain(misfit) else None
 
 
 def _scores_beside_noise(

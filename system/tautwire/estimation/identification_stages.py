@@ -90,9 +90,11 @@ def select_with_other_interpolation(state: Identification) -> Identification:
 
 def _is_far_likelier(state: Identification, split: DataSplit) -> bool:
     """Whether other data are far likelier under the selected effects, whose values are fitted anew."""
-    fitter, selection, least = state.context.fitter, state.selection, state.context.policy.preprocessing.min_speed_gain
+    fitter, selection, policy = state.context.fitter, state.selection, state.context.policy.preprocessing
     robot, chosen, data = selection.fit.robot, selection.accepted, state.context.split.estimation
-    before = fitter.log_likelihood(robot, chosen, data)
+    innovations = fitter.judged(robot, chosen, data)
+    before = innovations.log_likelihood(data.rows)
+    least = policy.min_speed_gain if fitter.has_disturbance else policy.decisive_gain(innovations.misfit(data.rows))
     gain = fitter.log_likelihood(robot, chosen, split.estimation) - before
     # What leaves white noise leaves nothing for other data to explain.
     is_explained = not fitter.has_disturbance and state.selection_explains

@@ -187,7 +187,7 @@ def _with_likely_interpolation(
     gain = fitter.log_likelihood(robot, (), smooth.estimation) - innovations.log_likelihood(rows)
     misfit = 0.0 if fitter.has_disturbance else innovations.misfit(rows)
     value_count = int(np.sum(innovations.observed[rows]))
-    if gain <= max(policy.min_cubic_gain * value_count, policy.min_speed_gain_to_misfit * misfit):
+    if gain <= max(policy.min_cubic_gain * value_count, policy.min_cubic_gain_to_misfit * misfit):
         return fitter, split
     return with_fitted_disturbance(fitter, robot, (), smooth.estimation), smooth
 

@@ -61,7 +61,7 @@ def speed_versions(
     other = with_fitted_disturbance(other, robot, (), estimation)
     rows, before = split.estimation.rows, fitter.innovations(robot, split.estimation)
     gain = other.log_likelihood(robot, (), estimation) - before.log_likelihood(rows)
-    decisive_gain = max(policy.min_speed_gain, policy.min_speed_gain_to_misfit * before.misfit(rows))
+    decisive_gain = policy.decisive_gain(before.misfit(rows))
     is_undecided = decisive_gain > policy.min_speed_gain and not fitter.has_disturbance and recorded.rope_lengths
     if gain < decisive_gain and not is_undecided:
         return [as_recorded]
