@@ -25,13 +25,18 @@ from tests.support.recordings import recorded
 from tests.support.robots import example
 
 
+def of_one_recording() -> IdentificationContext:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+
+
 @pytest.mark.parametrize(("evidence", "expected"), [(5.0, 5.0), (50.0, 10.0), (5000.0, 5000.0)])
 def test_a_coarse_baseline_is_made_exact_where_it_decides(
     evidence: float, expected: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    context = of_one_recording()
+    robot = context.robot
     hypothesis = Hypothesis(BY_NAME["drag"], ())
     score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
     monkeypatch.setattr(candidate_scoring, "maximised_validation_likelihood", lambda *_: 1040.0)
@@ -82,9 +87,8 @@ def test_candidates_get_own_disturbances_unless_fit_and_check_agree_on_the_best_
 def test_a_rival_that_was_led_astray_replaces_the_best_if_it_explains_more_at_its_own_optimum(
     is_astray: bool, refit_evidence: float, is_replaced: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    context = of_one_recording()
+    robot = context.robot
     best, rival = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("relaxation", "hysteresis"))
     starts = {h: (robot.with_effect(h.setting(robot)),) for h in (best, rival)}
     fits = {h: Fit.without_parameters(robots[0]) for h, robots in starts.items()}
@@ -191,9 +195,8 @@ def test_winch_speeds_are_interpolated_otherwise_where_the_best_effects_are_far_
     has_other: bool,
     is_otherwise: bool,
 ) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    context = of_one_recording()
+    robot = context.robot
     other = replace(context.split, notes=("cubic",))
     fit = Fit.without_parameters(robot)
     names = ("relaxation", "relaxation", "damping", "creep", "slack", "friction")

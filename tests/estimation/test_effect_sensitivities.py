@@ -34,7 +34,8 @@ def along(name: str, form: tuple[str, ...], trial: dict[str, float], noise: Nois
     )
     slopes, parts = directions.start_sensitivities, []
     for run in linearise_filter(likelihood, [], RECORDING):
-        slopes, moved = run.propagate_sensitivities(slopes, *directions.forcing_terms(run))
+        by_rates, by_outputs = directions.of_rates_and_outputs(run)
+        slopes, moved = run.propagate_sensitivities(slopes, run.integrated_forcing(by_rates), by_outputs)
         parts.append(moved[run.is_recorded])
     return np.concatenate(parts)
 

@@ -88,6 +88,19 @@ def test_progress_advances_with_each_effect_that_is_compiled() -> None:
     assert shares[0] == 0.0 and shares == sorted(set(shares)) and len(shares) == 4 and shares[-1] < 0.2
 
 
+@pytest.mark.parametrize("nats", [float("nan"), float("inf")])
+def test_a_program_whose_separation_is_no_number_is_none_of_the_best(
+    monkeypatch: pytest.MonkeyPatch, nats: float
+) -> None:
+    effects = effects_by_name(THREE, "damping,payload")
+    problem = input_design._design_problem(THREE, effects, DesignOptions(LIMITS, 3.0, 0.05, 1), quiet)
+    decision_variables = np.full(18, 0.3)
+    assert problem.score(decision_variables) > input_design.INFEASIBLE_SCORE
+    unknown = input_design.EffectSeparation(*effects, nats)
+    monkeypatch.setattr(input_design._DesignProblem, "separations", lambda self, recording: [unknown])
+    assert problem.score(decision_variables) == input_design.INFEASIBLE_SCORE
+
+
 def test_a_path_shrinks_until_it_keeps_the_limits_and_finely_no_more_than_they_need() -> None:
     options = DesignOptions(replace(LIMITS, speed=0.5), 3.0, 0.05, 1)
     problem = input_design._design_problem(THREE, effects_by_name(THREE, "damping,payload"), options, quiet)

@@ -527,11 +527,9 @@ def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
 def test_a_first_round_is_kept_where_time_ends_before_another_interpolation_is_scored(
     monkeypatch: pytest.MonkeyPatch, ends: str
 ) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    context = context_with(has_disturbance=False)
     other = replace(context.split, notes=("cubic",))
-    fit = Fit.without_parameters(robot)
+    fit = Fit.without_parameters(context.robot)
     first, second = ([CandidateScore(Hypothesis(BY_NAME[n], (1,)), fit, 9.0, 1.5)] for n in ("creep", "damping"))
 
     def likelier(context: IdentificationContext, scores: list[CandidateScore]) -> Any:

@@ -15,9 +15,9 @@ from tautwire.recordings.alternative_readings import WindingReading
 from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.geometry_reading import GeometryReading
 from tautwire.recordings.mistaken_robot import robot_file_mistakes
-from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
+from tautwire.recordings.mistaken_tensions import TensionCheck, _likely_orders, check_tensions
 from tautwire.recordings.recording import Recording, read_recording
-from tautwire.recordings.weight_balance import force_balance
+from tautwire.recordings.weight_balance import ForceBalance, force_balance
 from tautwire.robot.schema import Robot
 from tautwire.robot.static_equilibrium import static_tensions
 from tests.support.pose_recordings import noisy, wandering_recording
@@ -269,6 +269,30 @@ def test_swapped_load_cells_are_told_where_ropes_pull_far_more_than_the_weight()
     assert check is not None and check.misfit > 0.05 and check.mistakes == ()
     (error,) = recording_mistakes(robot, replace(erring, tension=erring.tension[:, [0, 2, 1, *range(3, 8)]]))
     assert "are tension_1, tension_3, tension_2, tension_4" in error.problem
+
+
+def planar_balance(random: np.random.Generator, gain_error: float) -> ForceBalance:
+    """Four ropes in a plane that pull four times the weight of 10 N, on a motion of a few centimetres."""
+    anchors = np.array([[1.5, 0.0, 0.0], [1.5, 0.0, 2.3], [-1.5, 0.0, 2.3], [-1.5, 0.0, 0.0]])
+    moved = np.array([0.05, 0.0, 0.05]) * random.uniform(-1.0, 1.0, (80, 3))
+    ropes = anchors - (np.array([0.1, 0.0, 1.2]) + moved)[:, None]
+    directions = (ropes / np.linalg.norm(ropes, axis=2, keepdims=True)).transpose(0, 2, 1)
+    weight = np.tile([0.0, 0.0, 10.0], (80, 1))
+    missing = weight - 20.0 * directions.sum(axis=2)
+    tensions = 20.0 + np.einsum("bic,bc->bi", np.linalg.pinv(directions), missing)
+    gains = 1.0 + gain_error * random.uniform(-1.0, 1.0, 4)
+    return ForceBalance(0.25 * np.arange(80), directions, gains * tensions, weight, (True,) * 4)
+
+
+def test_gains_of_single_load_cells_are_no_other_order_and_swapped_cells_are_no_gains() -> None:
+    """Of gains that are off by 5 % one in a hundred still looks like another order."""
+    random = np.random.default_rng(1)
+    orders = [_likely_orders(planar_balance(random, 0.05))[0] for _ in range(300)]
+    assert sum(order != (0, 1, 2, 3) for order in orders) <= 4
+    for _ in range(20):
+        balance = planar_balance(random, 0.01)
+        swapped = replace(balance, tensions=balance.tensions[:, [1, 0, 2, 3]])
+        assert _likely_orders(swapped) == [(1, 0, 2, 3)]
 
 
 def test_load_cells_in_a_circle_are_told() -> None:

@@ -138,17 +138,21 @@ def _with_kinematic_radii(
     scales = {scale.cable: scale for scale in kinematic_scales(replace(context.robot, effects=others), counted)}
     if any(drum.form != RADIUS_FORM or not scales.keys() >= set(drum.cables) for drum in drums):
         return context, selection
-    chosen = tuple(each for old in accepted for each in ((split_by_cable([old]) or [old]) if old in drums else [old]))
+    evidence = [
+        (each, nats)
+        for old, nats in zip(accepted, selection.evidence, strict=True)
+        for each in ((split_by_cable([old]) or [old]) if old in drums else [old])
+    ]
+    chosen = tuple(hypothesis for hypothesis, _ in evidence)
     fitter, fit = _fit_beside_radii(context, reduce(_separated, drums, selection.fit.robot), chosen, scales)
     gain = _unseen_gain(context, (context.fitter, selection.fit.robot, accepted), (fitter, fit.robot, chosen))
-    evidence = {cable: e for h, e in zip(accepted, selection.evidence, strict=True) if h in drums for cable in h.cables}
-    if not gain >= -context.policy.selection.min_cable_evidence_ratio * max(evidence.values()):
+    of_drums = max(nats for hypothesis, nats in evidence if hypothesis.effect is DRUM)
+    if not gain >= -context.policy.selection.min_cable_evidence_ratio * of_drums:
         return context, selection
-    kept = {h: e for h, e in zip(accepted, selection.evidence, strict=True) if h not in drums}
     kinematic = replace(
         selection,
         accepted=chosen,
-        evidence=tuple(kept[h] if h in kept else evidence[h.cables[0]] for h in chosen),
+        evidence=tuple(nats for _, nats in evidence),
         fit=fit,
         disturbance=fitter.noise.disturbance,
     )

@@ -60,10 +60,10 @@ def likelier_interpolation(context: IdentificationContext, scores: Sequence[Cand
     """
     if context.fitter.has_disturbance:
         return None
-    policy, best_of_effects = context.policy.selection, {}
-    for score in sorted((s for s in scores if isfinite(s.mean_square)), key=lambda score: score.evidence):
-        best_of_effects[score.hypothesis.effect.name] = score
-    ranked = sorted(best_of_effects.values(), key=lambda score: -score.evidence)[: policy.fits_with_other_interpolation]
+    policy, best_of_effects = context.policy.selection, dict[str, CandidateScore]()
+    for score in sorted((s for s in scores if isfinite(s.mean_square)), key=lambda score: -score.evidence):
+        best_of_effects.setdefault(score.hypothesis.effect.name, score)
+    ranked = list(best_of_effects.values())[: policy.fits_with_other_interpolation]
     value_count = context.split.validation.value_count(context.robot.platform.is_rigid_body)
     largest_by_chance = 1.0 + policy.max_chance_deviations * (2.0 / max(value_count, 1)) ** 0.5
     if not ranked or ranked[0].mean_square <= largest_by_chance:

@@ -94,7 +94,7 @@ def validate_by_cosimulation(
     comparisons, noise_floors = compare_cosimulations(identified, fitter, data_sets, runs_before, runs_after)
     limits = [largest_chance_errors(fitter, identified, sample, policy) for sample in data_sets]
     all_near_floor = all(
-        is_near_noise_floor(c.errors_after, limit, 1.0) for c, limit in zip(comparisons, limits, strict=True)
+        is_near_noise_floor(c.errors_after, limit) for c, limit in zip(comparisons, limits, strict=True)
     )
     return (comparisons, noise_floors) if all_near_floor else None
 
@@ -125,9 +125,7 @@ def output_errors(recording: Recording, outputs: Outputs) -> Errors:
 
 def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     """Noise floor: the errors that noise of the sensors and winch speeds alone would leave in a simulation."""
-    variances = fitter.open_loop_variances(robot, data)
-    measured = measured_outputs(data.recording, robot.platform.is_rigid_body)
-    return _root_mean_squares(np.where(np.isfinite(measured), variances, np.nan), robot.cable_count)
+    return _errors_of_noise(fitter, robot, data, white_ratio=1.0, drift_ratio=1.0)
 
 
 def largest_chance_errors(fitter: Fitter, robot: Robot, data: DataSet, policy: CosimulationPolicy) -> Errors:
@@ -135,16 +133,21 @@ def largest_chance_errors(fitter: Fitter, robot: Robot, data: DataSet, policy: C
 
     Ropes whose recorded speeds have noise drift as one; all of a robot's tensions may hang on one such walk.
     """
+    return _errors_of_noise(fitter, robot, data, policy.max_error_ratio, policy.max_drift_ratio)
+
+
+def _errors_of_noise(fitter: Fitter, robot: Robot, data: DataSet, white_ratio: float, drift_ratio: float) -> Errors:
+    """Errors at these ratios to those that white noise of sensors, and what noisy speeds make drift, are to leave."""
     variances = fitter.open_loop_variances(robot, data)
     white = np.minimum(fitter.noise.white_variances(robot.cable_count), variances)
-    squares = policy.max_error_ratio**2 * white + policy.max_drift_ratio**2 * (variances - white)
+    squares = white_ratio**2 * white + drift_ratio**2 * (variances - white)
     measured = measured_outputs(data.recording, robot.platform.is_rigid_body)
     return _root_mean_squares(np.where(np.isfinite(measured), squares, np.nan), robot.cable_count)
 
 
-def is_near_noise_floor(after: Errors, noise_floor_errors: Errors, max_ratio: float) -> bool:
-    """Whether the errors of a co-simulation are at most a multiple of the noise floor."""
-    pairs = zip(after.by_kind, noise_floor_errors.by_kind, strict=True)
+def is_near_noise_floor(after: Errors, of_noise: Errors, max_ratio: float = 1.0) -> bool:
+    """Whether the errors of a co-simulation are at most a multiple of those of noise."""
+    pairs = zip(after.by_kind, of_noise.by_kind, strict=True)
     return all(not error > max_ratio * least for error, least in pairs)
 
 

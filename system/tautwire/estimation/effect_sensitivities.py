@@ -145,12 +145,7 @@ class EffectSensitivities:
         theta: Array = np.append(self._nominal_values, self._shape_values[trial])
         return theta
 
-    def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
-        """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
-        rate_sensitivities, output_sensitivities = self.along(run)
-        return run.integrated_forcing(rate_sensitivities), output_sensitivities
-
-    def along(self, run: LinearisedSegment) -> tuple[Array, Array]:
+    def of_rates_and_outputs(self, run: LinearisedSegment) -> tuple[Array, Array]:
         """Sensitivities of the rates (K + 1, n, p) and outputs (K, m, p) along the next segment of the run."""
         inputs = np.pad(run.speeds, ((0, self._input_count - len(run.speeds)), (0, 0)))
         columns = (run.speeds[:, 1:], run.step[None, :], run.shift, run.rotation)

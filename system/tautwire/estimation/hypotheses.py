@@ -113,7 +113,7 @@ def hypotheses(robot: Robot, has_disturbance: bool = False) -> tuple[Hypothesis,
 def searched_hypotheses(robot: Robot, has_disturbance: bool = False) -> tuple[Hypothesis, ...]:
     """The hypotheses of a search: :func:`hypotheses`, and a payload beside the centre of mass of a rigid platform.
 
-    A round without it takes what carries a moment, sag of all ropes, for such a load, and never comes back.
+    Without that sag of all ropes, which has a moment too, takes its place in the first round.
     """
     larger = with_larger_forms([Hypothesis(PAYLOAD, ())], robot)
     return (*hypotheses(robot, has_disturbance), *larger)

@@ -211,8 +211,8 @@ class CosimulationPolicy:
 
     # Errors over what noise alone would leave; rightly named effects left at most 1.2 in 55 of 55 blind recordings.
     max_error_ratio: float = 1.5
-    # The same of what noisy winch speeds make drift. Over a run the mean square of one random walk is 5.6 times its
-    # expectation in 1 of 100; at 1.5 times its root a tenth would be more.
+    # The same of what noisy winch speeds make drift. Over a run the mean square of one random walk exceeds 5.6 times
+    # its expectation once in 100, and 2.25 times, as at a ratio of 1.5, once in 10.
     max_drift_ratio: float = 2.36
     # Of the FMUs' own integration of effects' states, far below any sensor's noise: a hysteresis on three steel ropes
     # differed by 0.07 um and 0.014 N from 1e-9, in less than half its time.

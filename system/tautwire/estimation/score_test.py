@@ -175,7 +175,7 @@ def statistics_of_runs(
         counting = np.zeros(len(run.is_recorded), dtype=bool)
         counting[run.is_recorded] = rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
         recorded_rows += int(np.sum(run.is_recorded))
-        by_effect = [effect.along(run) for effect in effects]
+        by_effect = [effect.of_rates_and_outputs(run) for effect in effects]
         by_rates, by_outputs = (np.concatenate(part, axis=2) for part in zip(*by_effect, strict=True))
         state_sensitivities, innovation_sensitivities = run.propagate_sensitivities(
             state_sensitivities, run.integrated_forcing(by_rates), by_outputs

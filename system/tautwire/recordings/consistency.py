@@ -108,18 +108,30 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return (error,)
     elif motion is not None and _is_hopeless(robot, recording, motion):
         errors.append(unexplained_error(recording, motion))
-    # Of a platform outside of its robot ropes have no directions: that is told first, and by its start.
-    is_outside = not errors and _distance_of_first(robot, recording) > robot_size(robot)
-    if robot.formulas or declared & EFFECTS_ON_FORCES or is_outside:
+    if robot.formulas or declared & EFFECTS_ON_FORCES:
         return tuple(errors)
+    return _with_tension_errors(robot, recording, geometry, winding, tuple(errors))
+
+
+def _with_tension_errors(
+    robot: Robot,
+    recording: Recording,
+    geometry: GeometryReading,
+    winding: WindingReading,
+    errors: tuple[RecordingError, ...],
+) -> tuple[RecordingError, ...]:
+    """The errors, with what the tensions say where poses and winches are read in the way that mends these."""
+    # Of a platform outside of its robot ropes have no directions: that is told first, and by its start.
+    if not errors and _distance_of_first(robot, recording) > robot_size(robot):
+        return errors
     tensions = check_tensions(robot, recording, geometry, winding)
-    if tensions is not None and tensions.mistakes:
-        errors.append(tension_error(recording, tensions))
-        if tensions.order == winding.order != tuple(sorted(winding.order)):
-            return (cable_order_error(errors, winding.order),)
-    elif tensions is not None and tensions.is_hopeless and not errors:
-        errors.append(hopeless_tension_error(recording, tensions))
-    return tuple(errors)
+    if tensions is None:
+        return errors
+    if tensions.mistakes:
+        errors = (*errors, tension_error(recording, tensions))
+        is_of_both = tensions.order == winding.order != tuple(sorted(winding.order))
+        return (cable_order_error(errors, winding.order),) if is_of_both else errors
+    return (hopeless_tension_error(recording, tensions),) if tensions.is_hopeless and not errors else errors
 
 
 def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:

@@ -53,8 +53,8 @@ def cable_order_error(errors: Sequence[RecordingError], order: Sequence[int]) ->
     """The error of winches and load cells in one other order, which the robot file's cables may have instead."""
     tables = ", ".join(str(order.index(column) + 1) for column in range(len(order)))
     problem, hint = ("; ".join(texts) for texts in zip(*((e.problem, e.hint) for e in errors), strict=True))
-    instead = f"write the [[cable]] tables of the robot file in the order {tables}, as both say of it; or else {hint}"
-    return RecordingError(errors[0].where, problem, instead)
+    instead = f"write the [[cable]] tables of the robot file in the order {tables}, as winches and load cells both say"
+    return RecordingError(errors[0].where, problem, f"{instead}; or else {hint}")
 
 
 def hopeless_tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:

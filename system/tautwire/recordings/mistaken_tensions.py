@@ -24,10 +24,11 @@ Array = NDArray[np.float64]
 MIN_SWAPPED_MISFIT, MAX_SCALED_MISFIT = 0.03, 0.3
 # What right ones leave at most, of the weight or of larger tensions: lifelike platforms on four cables leave 0.038.
 MAX_ORDER_MISFIT = 0.04
-# Standard deviation of the ropes' directions from which on the motion tells one load cell from another; beside gains
-# of 5 % and large tensions an order in 25 fitted by chance where a planar robot moved by 5 cm, none where by 15 cm.
-MIN_DIRECTION_DEVIATION, MIN_DEVIATION_BESIDE_GAINS = 0.01, 0.025
+# Standard deviation of the ropes' directions from which on the motion tells one load cell from another.
+MIN_DIRECTION_DEVIATION = 0.01
 EQUAL_RATIO = 1.5
+# Gains that are off by less, of single cells, go before another order where they balance as well, or to this misfit.
+MAX_CELL_GAIN_ERROR, MAX_MISFIT_BY_GAINS = 0.1, 0.015
 # How far payloads and gains may be off, and by how much where the unit is of the size of a wrong mass.
 MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("daN", "kg", "lbf")
 MAX_PERMUTED_CABLES = 5
@@ -100,7 +101,8 @@ def check_tensions(
     is_as_read = geometry == GeometryReading() and winding == WindingReading()
     readings = [reading for order in _likely_orders(balance) for reading in _unit_readings(balance, order)]
     fewest = min((len(tuple(reading.mistakes())) for reading in readings), default=0)
-    mistakes = tuple(mistakes for r in readings if len(mistakes := tuple(r.mistakes())) == fewest) if fewest else ()
+    readings = [reading for reading in readings if len(tuple(reading.mistakes())) == fewest]
+    mistakes = tuple(tuple(reading.mistakes()) for reading in readings) if fewest else ()
     corrected_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
     if is_as_read:
         cells = likely_cell_readings(robot, recording, balance)
@@ -112,7 +114,7 @@ def check_tensions(
     is_carried = CARRIED[0] < carried < CARRIED[1] or misfit < MAX_GAIN_ERROR * balance.tension_to_weight()
     is_explained = is_carried or mistakes or balance.explains_beside_zeros(MAX_MISFIT_BESIDE_ZEROS)
     is_hopeless = is_as_read and not is_explained
-    order = next((r.order for r in readings if len(tuple(r.mistakes())) == fewest), ())
+    order = readings[0].order if readings else ()
     return TensionCheck(carried, misfit, corrected_misfit, mistakes, order, is_hopeless)
 
 
@@ -121,12 +123,14 @@ def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
     orders = list(_orders(balance))
     misfits = [balance.misfit(order, balance.best_factor(order)) for order in orders]
     best = min(misfits)
-    deviation = float(np.std(balance.directions, axis=0).max())
+    tells_cells_apart = float(np.std(balance.directions, axis=0).max()) > MIN_DIRECTION_DEVIATION
     factor = balance.best_factor(orders[misfits.index(best)])
-    larger = balance.tension_to_weight(factor) if deviation > MIN_DEVIATION_BESIDE_GAINS else 1.0
-    limit = MAX_ORDER_MISFIT * max(1.0, larger)
+    is_right = best <= MAX_ORDER_MISFIT * max(1.0, balance.tension_to_weight(factor))
     is_better = misfits[0] > max(MIN_SWAPPED_MISFIT, MIN_IMPROVEMENT * best)
-    if deviation <= MIN_DIRECTION_DEVIATION or best > limit or not is_better:
+    if not (tells_cells_apart and is_right and is_better):
+        return orders[:1]
+    max_misfit = max(EQUAL_RATIO * best, MAX_MISFIT_BY_GAINS)
+    if balance.explains_by_gains(balance.best_factor(orders[0]), MAX_CELL_GAIN_ERROR, max_misfit):
         return orders[:1]
     return [order for order, misfit in zip(orders, misfits, strict=True) if misfit <= EQUAL_RATIO * best]
 

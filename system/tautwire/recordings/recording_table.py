@@ -192,7 +192,7 @@ MAX_MAGNITUDE = 1e12  # beyond any quantity of a cable robot in SI units
 # What loggers, spreadsheets and databases write where a sensor dropped out.
 _NOT_A_NUMBER = ("nan", "NaN", "NAN", "-nan", "-NaN", "-nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND")
 # As C writes it on Windows in six digits, and spreadsheets in English, German and French where a formula fails.
-_OF_FORMULAS = ("1.#QNAN0", "-1.#IND00", "#N/A", "#NV", "#N/D", "#DIV/0!", "#VALUE!", "#WERT!", "#VALEUR!")
+_OF_FORMULAS = ("1.#QNAN0", "-1.#IND00", "#N/A", "#NV", "#N/D", "#DIV/0!", "#VALUE!", "#WERT!", "#VALEUR!", "#NUM!")
 _WORDS = ("NA", "N/A", "n/a", "N.A.", "<NA>", "NULL", "null", "None", "nil")
 MISSING_CELLS = ("", *_NOT_A_NUMBER, *_OF_FORMULAS, *_WORDS, *("-" * count for count in range(1, 7)))
 # A time beyond this many seconds is an epoch in a smaller unit; in s, epochs of today are 1.8e9.

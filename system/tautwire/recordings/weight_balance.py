@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,15 +72,25 @@ class ForceBalance:
 
         And to half of what is left without them, so that numbers that are no tensions do not.
         """
-        still = replace(self, tensions=np.zeros_like(self.tensions))
-        return self._misfit_beside_zeros() < min(max_misfit, 0.5 * still._misfit_beside_zeros())
+        ones, declared = np.ones_like(self.tensions), tuple(range(len(self.has_load_cell)))
+        _, misfit = self._balancing_factors(ones, self.required - self.forces(declared))
+        _, misfit_without = self._balancing_factors(ones, self.required)
+        return misfit < min(max_misfit, 0.5 * misfit_without)
 
-    def _misfit_beside_zeros(self) -> float:
-        directions = self.directions[:, :, np.array(self.has_load_cell)]
-        shapes = directions.reshape(-1, directions.shape[2])
-        unbalanced = (self.required - self.forces(tuple(range(len(self.has_load_cell))))).ravel()
-        zeros = np.linalg.lstsq(shapes, unbalanced, rcond=None)[0]
-        return float(np.linalg.norm(unbalanced - shapes @ zeros) / np.linalg.norm(self.required))
+    def explains_by_gains(self, factor: float, max_error: float, max_misfit: float) -> bool:
+        """Whether tensions times a factor balance to a misfit if each load cell has a gain that is off by no more."""
+        gains, misfit = self._balancing_factors(factor * self.tensions, self.required)
+        return misfit <= max_misfit and float(np.max(np.abs(gains - 1.0))) < max_error
+
+    def _balancing_factors(self, tensions: Array, wrenches: Array) -> tuple[Array, float]:
+        """Factors of the tensions (B, n), one for each load cell, that balance the wrenches (B, d) best; and a misfit.
+
+        That is the rms of what is left, over that of the required wrench.
+        """
+        pulls = (self.directions * tensions[:, None, :])[:, :, np.array(self.has_load_cell)]
+        shapes = pulls.reshape(-1, pulls.shape[2])
+        factors = np.asarray(np.linalg.lstsq(shapes, wrenches.ravel(), rcond=None)[0], dtype=float)
+        return factors, float(np.linalg.norm(wrenches.ravel() - shapes @ factors) / np.linalg.norm(self.required))
 
     def best_factor(self, order: tuple[int, ...]) -> float:
         """The factor on all tensions that balances best; 0 where none does."""

@@ -50,7 +50,7 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
 def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterator[RobotFileError]:
     modulus, area = cable.modulus, cable.area
     area_in_m2 = area if area <= MAX_AREA else 1e-6 * area
-    if modulus * area_in_m2 < weight and not (MODULI[0] <= modulus <= MODULI[1] and area <= MAX_AREA):
+    if modulus * area_in_m2 < weight and not _is_a_ropes(cable):
         problem = (
             f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to twice its "
             "length"
@@ -98,13 +98,18 @@ def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Itera
 def _thin_rope_errors(robot: Robot, weight: float, file: str) -> Iterator[RobotFileError]:
     """Error for each rope that its share of the weight would stretch to twice its length, though its modulus may be."""
     for number, cable in enumerate(robot.cables):
-        if cable.modulus * cable.area < weight and MODULI[0] <= cable.modulus <= MODULI[1] and cable.area <= MAX_AREA:
+        if cable.modulus * cable.area < weight and _is_a_ropes(cable):
             problem = (
                 f"is {cable.area:g} m^2, with which its share of the weight, {weight:.3g} N, would stretch it to twice "
                 "its length"
             )
             hint = f"write it in m^2, if it was converted from mm^2 twice as {1e6 * cable.area:g}"
             yield _error(file, ("cable", number, "area"), problem, hint)
+
+
+def _is_a_ropes(cable: Cable) -> bool:
+    """Whether a rope may have the modulus, and the area, whatever it carries."""
+    return MODULI[0] <= cable.modulus <= MODULI[1] and cable.area <= MAX_AREA
 
 
 def _weight_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
@@ -115,7 +120,7 @@ def _weight_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     bound = robot.cable_count * robot.tension.maximum if robot.tension else math.inf
     if weight > bound:
         problem = f"weighs {weight:.4g} N, more than the {bound:.4g} N that {ropes} may bear by tension.maximum"
-    elif weight > stiffness and all(MODULI[0] <= cable.modulus <= MODULI[1] for cable in robot.cables):
+    elif weight > stiffness and all(map(_is_a_ropes, robot.cables)):
         problem = f"weighs {weight:.4g} N, which would stretch {ropes} to twice their length (E A is {stiffness:.3g} N)"
     else:
         return
