@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -45,6 +46,21 @@ def test_native_fmus_are_other_ones_and_run_as_those_of_python(tmp_path: Path) -
         changed = replace(each, platform=replace(each.platform, mass=310.0))
         runs.append(cosimulate(cached_fmus(changed, build_bundle(each), tmp_path / kind), time, speed))
     assert runs[1].position == pytest.approx(runs[0].position, abs=1e-11)
+
+
+def test_a_campaign_that_prefers_native_fmus_runs_them_also_for_other_structures(tmp_path: Path) -> None:
+    plan = read(tmp_path, moving())
+    contexts = {kind: build_context(plan, {}, prefers_native=kind == "native") for kind in ("native", "python")}
+    rows = [run_job(context, Job(3, 3, 0, VALUES), tmp_path / kind).row for kind, context in contexts.items()]
+    native, python = ({key: value for key, value in row.items() if isinstance(value, float)} for row in rows)
+    assert native == pytest.approx(python, rel=1e-9) and rows[0].keys() == rows[1].keys() and "failure" not in rows[0]
+    damped = example("three").with_effect(EffectSetting("damping", {"damping": 2e9}, (1, 2, 3)))
+    is_machine_code = {}
+    for kind, context in contexts.items():
+        assert context.bundle is not None
+        with ZipFile(cached_fmus(damped, context.bundle, tmp_path / kind).platform) as archive:
+            is_machine_code[kind] = "sources/all.c" in archive.namelist()
+    assert is_machine_code == {"native": True, "python": False}
 
 
 def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from tautwire.campaigns import dask_cluster as clusters
 from tautwire.campaigns.campaign_dataset import open_dataset, part_files, read_rows
 from tautwire.campaigns.campaign_plan import UnfinishedError
 from tautwire.campaigns.campaign_runner import run_campaign, run_count
-from tautwire.campaigns.dask_cluster import WORKER_LOST, dashboard_message, dask_client
+from tautwire.campaigns.dask_cluster import WORKER_LOST, context_future, dashboard_message, dask_client
 from tautwire.campaigns.plan_file import read_plan
 from tautwire.cli import run as command
 from tests.support.campaigns import AT_REST, moving, plan_file, read
@@ -50,6 +50,16 @@ def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: P
     assert rows_of(out) == bare_rows(plan, tmp_path / "bare")
     series = read_rows(out, ["z"], "series")
     assert series.num_rows == 16 * 5
+
+
+@pytest.mark.validate
+def test_machine_code_runs_on_a_cluster_of_ours_alone(tmp_path: Path) -> None:
+    plan, prefers_native = read(tmp_path, moving(8)), []
+    with cluster(tmp_path, 1) as (address, _):
+        for scheduler in (None, address):
+            with dask_client(scheduler, 1) as client:
+                prefers_native.append(context_future(client, plan, {}).result().bundle.prefers_native)
+    assert prefers_native == [True, False]
 
 
 @pytest.mark.validate

@@ -65,8 +65,10 @@ class RunResult:
     series: Series = field(default_factory=dict)
 
 
-def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignContext:
+def build_context(plan: Plan, recordings: Mapping[str, Recording], prefers_native: bool = False) -> CampaignContext:
     """Build the FMUs and design the controllers that all runs share.
+
+    FMUs are machine code where that is preferred and a compiler works; rows are the same to rounding.
 
     Raises what building and design raise where the declared robot cannot follow a path.
     """
@@ -77,7 +79,8 @@ def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignCo
         variant: build_reference_input(robot, plan.paths[path], controller, plan.compute, recordings)
         for variant, (path, controller) in enumerate(plan.variants)
     }
-    bundle = build_bundle(_simulated_robot(at_path_start(robot, plan.paths[0]), reference_inputs[0]))
+    simulated = _simulated_robot(at_path_start(robot, plan.paths[0]), reference_inputs[0])
+    bundle = build_bundle(simulated, prefers_native)
     differs_by_run = plan.belief == "varied" or any(key.startswith("platform.start") for key in plan.keys)
     return CampaignContext(plan, recordings, bundle, {} if differs_by_run else reference_inputs)
 

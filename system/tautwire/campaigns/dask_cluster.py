@@ -213,9 +213,11 @@ class _WorkerCapacity:
 def context_future(client: Any, plan: Plan, recordings: Any) -> Any:
     """Future of the context that all runs share, built in a worker and copied by Dask once to each other worker.
 
-    Where all workers that hold it are lost, Dask builds it again. Raises what :func:`build_context` raises.
+    Where all workers that hold it are lost, Dask builds it again. Workers of another scheduler than this process's own
+    may be other machines, where this one's machine code does not run. Raises what :func:`build_context` raises.
     """
-    future = client.submit(build_context, plan, recordings, pure=False)
+    prefers_native = client.cluster is not None
+    future = client.submit(build_context, plan, recordings, prefers_native, pure=False)
     error = future.exception()
     if isinstance(error, ImportError):
         hint = "install the same version of tautwire with its extra campaign where the workers run"

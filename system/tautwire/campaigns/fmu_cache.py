@@ -16,7 +16,7 @@ from tautwire_fmu.effect_variables import setting_name
 from tautwire_fmu.rigid_body_variables import INERTIA_ENTRIES
 
 from ..fmus.component_resources import cable_resources, platform_resource, winch_resource
-from ..fmus.packaging import RobotFmus, build_fmus, start_values
+from ..fmus.packaging import RobotFmus, build_fastest_fmus, build_fmus, start_values
 from ..robot.active_effects import has_sensor_effects
 from ..robot.schema import Robot
 
@@ -27,10 +27,14 @@ VECTOR_PARTS = {"anchor": "xyz", "start": "xyz", "centre_of_mass": "xyz", "start
 
 @dataclass(frozen=True)
 class FmuBundle:
-    """FMUs of a robot: ``files`` by component without the user's; ``structure`` is its :func:`structure_digest`."""
+    """FMUs of a robot: ``files`` by component without the user's; ``structure`` is its :func:`structure_digest`.
+
+    What is built beside it is machine code where ``prefers_native`` is set and a compiler works.
+    """
 
     structure: str
     files: Mapping[str, bytes]
+    prefers_native: bool = False
 
 
 def structure_digest(robot: Robot) -> str:
@@ -51,13 +55,16 @@ def component_data(robot: Robot) -> dict[str, dict[str, Any]]:
     return {name: each for name, each in data.items() if name not in user_slots}
 
 
-def build_bundle(robot: Robot) -> FmuBundle:
-    """Build the FMUs of a robot and read them into memory."""
+def build_bundle(robot: Robot, prefers_native: bool = False) -> FmuBundle:
+    """Build the FMUs of a robot and read them into memory.
+
+    As machine code where that is preferred and a compiler works: for runs on this machine.
+    """
+    build = build_fastest_fmus if prefers_native else build_fmus
     with tempfile.TemporaryDirectory(prefix="tautwire-campaign-") as folder:
-        build_fmus(robot, Path(folder))
-        return FmuBundle(
-            structure_digest(robot), {path.stem: path.read_bytes() for path in Path(folder).glob(f"*{FMU_SUFFIX}")}
-        )
+        build(robot, Path(folder))
+        files = {path.stem: path.read_bytes() for path in Path(folder).glob(f"*{FMU_SUFFIX}")}
+        return FmuBundle(structure_digest(robot), files, prefers_native)
 
 
 def cached_fmus(robot: Robot, bundle: FmuBundle, cache_folder: Path) -> RobotFmus:
@@ -70,7 +77,7 @@ def cached_fmus(robot: Robot, bundle: FmuBundle, cache_folder: Path) -> RobotFmu
     structure = structure_digest(robot)
     structure_folder = cache_folder / structure
     if not structure_folder.exists():
-        files = bundle.files if structure == bundle.structure else build_bundle(robot).files
+        files = bundle.files if structure == bundle.structure else build_bundle(robot, bundle.prefers_native).files
         _write_atomically(files, structure_folder)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
 

@@ -21,8 +21,7 @@ from ..cosimulation.robot_cosimulation import (
     run_cosimulation,
     step_size_control_for,
 )
-from ..fmus.native.c_toolchain import NativeBuildError
-from ..fmus.packaging import RobotFmus, build_fmus
+from ..fmus.packaging import build_fastest_fmus
 from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..robot.active_effects import platform_effects
@@ -52,19 +51,11 @@ def start_cosimulations(
 def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
     """Co-simulate a robot placed where a recording starts."""
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
-        fmus = _fastest_fmus(robot.as_modelled(), Path(folder))
+        fmus = build_fastest_fmus(robot.as_modelled(), Path(folder))
         fmus = replace(fmus, relative_tolerance=DEFAULT_POLICY.cosimulation.relative_tolerance)
         time = data.recording.time
         experiment = Experiment(recorded_input(data.recording), time, step_size_control_for(DEFAULT_STEP, None, time))
         return as_tracked(robot, run_cosimulation(fmus, experiment))
-
-
-def _fastest_fmus(robot: Robot, folder: Path) -> RobotFmus:
-    """FMUs as machine code, five times as fast, where a compiler works; else the same ones in Python."""
-    try:
-        return build_fmus(robot, folder, native=True)
-    except NativeBuildError:
-        return build_fmus(robot, folder)
 
 
 def as_tracked(robot: Robot, motion: CosimulationResult) -> CosimulationResult:

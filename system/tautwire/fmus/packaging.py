@@ -107,6 +107,20 @@ def build_fmus(
     )
 
 
+def build_fastest_fmus(robot: Robot, folder: str | Path) -> RobotFmus:
+    """Write FMUs as machine code, two to five times as fast, where a compiler works; else the same ones in Python.
+
+    For runs on this machine. Raises what :func:`build_fmus` raises but NativeBuildError.
+    """
+    # Loaded where it is needed, like all of the native FMUs.
+    from .native.c_toolchain import NativeBuildError
+
+    try:
+        return build_fmus(robot, folder, native=True)
+    except NativeBuildError:
+        return build_fmus(robot, folder)
+
+
 def build_whole_fmu(
     robot: Robot,
     folder: str | Path,
