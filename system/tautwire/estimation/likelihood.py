@@ -76,11 +76,6 @@ class Likelihood:
         """The equations that the filter is made of."""
         return self._filter_functions.model
 
-    @property
-    def moving_count(self) -> int:
-        """How many of the filter's states move, its first ones; the others are constant or decay."""
-        return self.model.states.numel() - len(self.uncertain)
-
     def innovations(
         self,
         recording: Recording,
