@@ -177,13 +177,15 @@ class CompiledFilter:
         samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
         buffers = recursion_buffers(output_count, size, parameter_count, integration.transition)
         run_recursion(Functions(_step(outputs), _step(process)), integration, moments, samples, record, buffers)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            log_variances = np.log(record.variances)
         return FilterResults(
             record.states.T,
             record.covariances,
             record.transitions,
             record.output_matrices,
             record.values,
-            record.log_variances,
+            log_variances,
             record.sensitivities.swapaxes(1, 2),
             FilterState(state, covariance, sensitivities.T),
         )

@@ -34,7 +34,7 @@ from .step_integration import (
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "fe08060e2df717d6401b43457340386553542f64a3bd144ad1fc24c9a173a1a6"
+STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
 
 
 class Functions(NamedTuple):
@@ -68,8 +68,8 @@ class Record(NamedTuple):
     """Predicted states and innovations that a run fills in.
 
     ``states`` (K + 1, n); unless they are empty, ``covariances`` and ``transitions`` to the next sample (K, n, n), the
-    latter zero before, and ``output_matrices`` (K, m, n); ``values`` and ``log_variances`` (K, m) of the innovations,
-    and ``sensitivities`` (K, p, m) of these.
+    latter zero before, and ``output_matrices`` (K, m, n); ``values`` (K, m) of the innovations in deviations, their
+    ``variances`` (K, m), and ``sensitivities`` (K, p, m) of the values.
     """
 
     states: Any
@@ -77,7 +77,7 @@ class Record(NamedTuple):
     transitions: Any
     output_matrices: Any
     values: Any
-    log_variances: Any
+    variances: Any
     sensitivities: Any
 
 
@@ -177,14 +177,15 @@ def _whiten(samples: Samples, record: Record, buffers: Buffers, k: int) -> None:
     """Whiten innovations and slopes, and record them; the ``whitening`` matrix has no row of what is not observed."""
     innovations, slopes = buffers.innovations, buffers.slopes
     variances, whitening = buffers.variances, buffers.whitening
-    for i in range(len(whitening)):
-        for c in range(len(whitening)):
+    count = len(whitening)
+    for i in range(count):
+        for c in range(count):
             whitening[i, c] = 1.0 if c == i else 0.0
-    for i in range(len(whitening)):
+    for i in range(count):
         variance = variances[i, i] + samples.white_variances[i]
         deviation = np.sqrt(variance)
         innovations[i] /= deviation
-        record.values[k, i], record.log_variances[k, i] = innovations[i], np.log(variance)
+        record.values[k, i], record.variances[k, i] = innovations[i], variance
         for parameter in range(len(slopes)):
             slopes[parameter, i] /= deviation
             record.sensitivities[k, parameter, i] = slopes[parameter, i]
@@ -195,20 +196,15 @@ def _whiten(samples: Samples, record: Record, buffers: Buffers, k: int) -> None:
             continue
         for c in range(i + 1):
             whitening[i, c] /= deviation
-        for later in range(i + 1, len(whitening)):
+        for later in range(i + 1, count):
             factor = variances[later, i] / deviation
             innovations[later] -= factor * innovations[i]
-            _subtract_row(whitening, later, factor, i)
-            _subtract_row(variances, later, factor / deviation, i)
+            for c in range(i + 1):
+                whitening[later, c] -= factor * whitening[i, c]
+            for c in range(count):
+                variances[later, c] -= factor / deviation * variances[i, c]
             for parameter in range(len(slopes)):
                 slopes[parameter, later] -= factor * slopes[parameter, i]
-
-
-@compiled
-def _subtract_row(matrix: Any, row: int, factor: float, other: int) -> None:
-    """Subtract a multiple of another row of a matrix from one, without a copy."""
-    for c in range(matrix.shape[1]):
-        matrix[row, c] -= factor * matrix[other, c]
 
 
 @compiled
@@ -224,31 +220,26 @@ def _update_covariance_over_step(
     transition: Any, decay: Any, process_noise: Any, covariance: Any, buffers: Buffers
 ) -> None:
     from_count, moving_count = transition.shape
-    size, moved_rows, moved = len(covariance), buffers.moved_rows, buffers.moved
+    moved_rows, moved = buffers.moved_rows, buffers.moved
     for r in range(moving_count):
         covariance[r, r] += process_noise[r]
     multiply(transition.T, covariance[:from_count], moved_rows)
     assign_matrix(buffers.moved_rows_from, moved_rows)
     multiply(buffers.moved_rows_from, transition, moved)
-    for r in range(_first_decaying(decay, moving_count), size):
-        for j in range(moving_count, size):
-            covariance[r, j] *= decay[r]
-            covariance[j, r] *= decay[r]
-    for r in range(moving_count, size):
-        covariance[r, r] += process_noise[r]
+    # Ranges from zero: an index that may be negative costs Numba a branch, and the loop its vectors.
+    decay, process_noise = decay[moving_count:], process_noise[moving_count:]
+    decaying, behind = covariance[moving_count:, moving_count:], moved_rows[:, moving_count:]
+    below, beside = covariance[moving_count:], covariance[:, moving_count:]
+    for r in range(len(decay)):
+        for c in range(len(decay)):
+            decaying[r, c] *= decay[r] * decay[c]
+        decaying[r, r] += process_noise[r]
     for r in range(moving_count):
-        for j in range(moving_count, size):
-            covariance[r, j] = covariance[j, r] = moved_rows[r, j] * decay[j]
-        for j in range(r, moving_count):
-            covariance[r, j] = covariance[j, r] = moved[r, j]
-
-
-@compiled
-def _first_decaying(decay: Any, first: int) -> int:
-    """Index of the first state that decays, behind those that are constant."""
-    while first < len(decay) and decay[first] == 1.0:
-        first += 1
-    return first
+        for c in range(len(decay)):
+            beside[r, c] = behind[r, c] * decay[c]
+            below[c, r] = beside[r, c]
+        for c in range(r + 1):
+            covariance[r, c] = covariance[c, r] = moved[r, c]
 
 
 @compiled

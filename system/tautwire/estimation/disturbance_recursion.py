@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "fe08060e2df717d6401b43457340386553542f64a3bd144ad1fc24c9a173a1a6"
+STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
 
 
 class DisturbanceStates(NamedTuple):

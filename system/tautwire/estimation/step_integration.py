@@ -162,8 +162,9 @@ def add_to_matrix(target: Any, factor: float, values: Any) -> None:
 
 @compiled_with_arrays
 def multiply(left: Any, right: Any, product: Any) -> None:
-    """Set the product of two matrices."""
-    np.dot(left, right, product)
+    """Set the product of two matrices; of none, NumPy's takes as long as of small ones."""
+    if product.size > 0:
+        np.dot(left, right, product)
 
 
 @compiled
