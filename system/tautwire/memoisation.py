@@ -1,4 +1,4 @@
-"""Memoisation of functions of a robot, which is asked for the same by its components, its designs and its reports."""
+"""Memoisation of functions of a robot or a recording, which are asked for the same again and again."""
 
 from __future__ import annotations
 

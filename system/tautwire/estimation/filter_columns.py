@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..memoisation import memoised
 from ..recordings.recording import Recording
 from ..recordings.speed_interpolation import bent_by, speed_bends
 
@@ -52,26 +53,32 @@ def filter_columns(
     The last ``rotation_columns`` of what was measured are rotation vectors, from which what is measured is zero. A gap
     in time is filled with samples without measurements, so that no step is longer than usual.
     """
-    steps = np.diff(recording.time)
-    step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
-    rows = np.append(0, np.cumsum(step_counts))
-    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
-    speed, bends = _speeds_in_parts(recording, step_counts)
-    measured_columns = np.zeros((measured.shape[1], len(time)))
+    rows, interval_columns, is_recorded = _interval_columns(recording)
+    measured_columns = np.zeros((measured.shape[1], len(is_recorded)), order="F")
     observed_columns, shift_columns = np.zeros_like(measured_columns), np.zeros_like(measured_columns)
     observed = np.isfinite(measured)
     measured_columns[:, rows] = np.where(observed, measured, 0.0).T
     observed_columns[:, rows] = observed.T
     shift_columns[:, rows] = shift.T
+    rotation = np.asfortranarray(_without_gaps(measured_columns, observed_columns, rotation_columns))
+    return (measured_columns, observed_columns, shift_columns, *interval_columns, rotation), is_recorded
+
+
+# A fit runs over the same few recordings thousands of times.
+@memoised(max_results=4)
+def _interval_columns(recording: Recording) -> tuple[NDArray[np.int64], tuple[Array, ...], NDArray[np.bool_]]:
+    """Which columns are samples of a recording, those of its winch speeds and times, and whether each is a sample."""
+    steps = np.diff(recording.time)
+    step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
+    rows = np.append(0, np.cumsum(step_counts))
+    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
+    speed, bends = _speeds_in_parts(recording, step_counts)
     step = np.append(np.diff(time), 0.0)
     drift = step * np.append(np.repeat(steps, step_counts), 0.0)
-    speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
     is_recorded = np.zeros(len(time), dtype=bool)
     is_recorded[rows] = True
-    rotation = _without_gaps(measured_columns, observed_columns, rotation_columns)
-    timing = (step[None, :], drift[None, :])
-    columns = (measured_columns, observed_columns, shift_columns, *speeds, bends, *timing, rotation)
-    return tuple(np.asfortranarray(column) for column in columns), is_recorded
+    columns = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]), bends, step[None, :], drift[None, :])
+    return rows, tuple(np.asfortranarray(column) for column in columns), is_recorded
 
 
 def _speeds_in_parts(recording: Recording, part_counts: NDArray[np.int64]) -> tuple[Array, Array]:
