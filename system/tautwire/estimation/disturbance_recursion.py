@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
+STEP_INTEGRATION_SHA256 = "86813644fee21625e68511eb2e4ec422d826c597b88500efe2a0d8a0428af056"
 
 
 class DisturbanceStates(NamedTuple):

@@ -32,7 +32,7 @@ from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBAN
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
 from .measurement_model import output_count, rotation_count
-from .native_functions import CompiledFunction
+from .native_functions import by_sample
 
 Array = NDArray[np.float64]
 
@@ -112,15 +112,18 @@ class Likelihood:
         """Instructions of the filter, in proportion to which this takes memory."""
         return self._filter_functions.instruction_count
 
-    @property
-    def outputs(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.output_function`."""
-        return self._filter_functions.outputs
+    def rate_jacobians(self, states: Array, arguments: Array, speed: Array) -> Array:
+        """Jacobians of the rates by the states (K, n, n), at states (n, K) that some speeds (cables, K) move.
 
-    @property
-    def rate_jacobian(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
-        return self._filter_functions.rate_jacobian
+        For ``arguments`` (p,) see :meth:`arguments`.
+        """
+        functions, count, first = self._filter_functions, states.shape[1], len(states) - len(self.uncertain)
+        static_start = functions.static_start(arguments)
+        statics = static_start.values[:, None] + static_start.slopes.T @ states[first:]
+        jacobians = functions.rate_jacobian(count, states, arguments[:, None], statics, speed)
+        by_state, by_statics = (by_sample(each, count) for each in jacobians)
+        by_state[:, :, first:] += by_statics @ static_start.slopes.T
+        return by_state
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
@@ -229,6 +232,7 @@ class Likelihood:
     ) -> Iterator[FilterSegment]:
         columns, is_recorded = filter_columns(recording, *outputs, rotation_count(self.model))
         theta = self.arguments(parameters)
+        static_start = self._filter_functions.static_start(theta)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
         length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
@@ -238,6 +242,7 @@ class Likelihood:
             inputs = FilterInputs(
                 of_segment,
                 theta[:, None],
+                static_start,
                 self.disturbance_arguments,
                 self.noise.white_variances(self.cable_count),
                 acceleration_noise_density,
