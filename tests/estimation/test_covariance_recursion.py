@@ -38,6 +38,9 @@ BY_PARAMETERS = GENERATOR.normal(size=(OUTPUTS, PARAMETERS))
 # Two numbers of the static start, which the constant and the parameters change.
 STATICS, STATIC_VALUES = 2, np.array([3.0, -1.0])
 STATICS_BY_CONSTANT, STATICS_BY_PARAMETERS = np.array([0.4, -0.7]), GENERATOR.normal(size=(PARAMETERS, 2))
+STATIC_START = StaticStart(
+    STATIC_VALUES + 0.5 * STATICS_BY_CONSTANT, np.array([0.5]), STATICS_BY_CONSTANT[None, :], STATICS_BY_PARAMETERS
+)
 STATES_BY_STATICS, OUTPUTS_BY_STATICS = GENERATOR.normal(size=(MOVING, 2)), GENERATOR.normal(size=(OUTPUTS, 2))
 WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
 MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
@@ -82,7 +85,12 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFu
     division = Division(1, 1, 1, 0)
     integration = Integration(
         step(driving),
-        StaticStart(STATIC_VALUES, STATICS_BY_CONSTANT[None, :], STATICS_BY_PARAMETERS),
+        StaticStart(
+            STATIC_VALUES + 0.5 * STATICS_BY_CONSTANT,
+            np.array([0.5]),
+            STATICS_BY_CONSTANT[None, :],
+            STATICS_BY_PARAMETERS,
+        ),
         step(of_part),
         step(of_slope),
         division,

@@ -155,7 +155,7 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
         size = len(begun)
         columns = (unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((0, 1)))
         functions, nothing = likelihood._filter_functions, np.zeros((0, 1))
-        inputs = FilterInputs(columns, nothing, functions.static_start(nothing), nothing, np.ones(11), 0.0)
+        inputs = FilterInputs(columns, nothing, functions.static_start(nothing, []), nothing, np.ones(11), 0.0)
         before = FilterState(begun.ravel(), np.eye(size), np.zeros((size, 0)))
         return functions.run(before, inputs, keeps_covariances=True)
 

@@ -196,11 +196,12 @@ class CompiledFilter:
             FilterState(state, covariance, sensitivities.T),
         )
 
-    def static_start(self, parameters: Array) -> StaticStart:
-        """The static start at some parameters (p,)."""
-        values, slopes = (np.array(each) for each in self._static_start(parameters, np.zeros(self._constant_count)))
+    def static_start(self, parameters: Array, constants: Array) -> StaticStart:
+        """The static start at some parameters (p,), linear about some uncertain constants (c,)."""
+        values, slopes = (np.array(each) for each in self._static_start(parameters, constants))
         by_parameters, by_constants = np.split(slopes.T, [slopes.shape[1] - self._constant_count])
-        return StaticStart(values.ravel(), *(np.ascontiguousarray(each) for each in (by_constants, by_parameters)))
+        derivatives = (np.ascontiguousarray(each) for each in (by_constants, by_parameters))
+        return StaticStart(values.ravel(), np.array(constants, dtype=float), *derivatives)
 
     @cached_property
     def _static_start(self) -> casadi.Function:

@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "86813644fee21625e68511eb2e4ec422d826c597b88500efe2a0d8a0428af056"
+STEP_INTEGRATION_SHA256 = "883420c31f0ede3d5bfd370def88536614fd4eaa9dc695985df4b316af6aa74a"
 
 
 class DisturbanceStates(NamedTuple):

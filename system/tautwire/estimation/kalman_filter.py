@@ -13,7 +13,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from ..recordings.speed_interpolation import bent_by
-from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
+from ..robot.symbolic_model import SymbolicModel, constants_as_parameters, with_statics_as_parameters
 from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_symbols import DisturbanceSymbols
 from .integration_steps import Substeps
@@ -76,7 +76,7 @@ def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_se
     (m, n) and by the parameters and the static start (m, p + s), each with the others held. Without sensitivities the
     last have no columns.
     """
-    disturbance, reduced = disturbance_symbols(model, noise), _with_statics_as_parameters(model)
+    disturbance, reduced = disturbance_symbols(model, noise), with_statics_as_parameters(model)
     state, instant_symbols = SX.sym("state", model.states.numel() + disturbance.count), SensorInstant.of(model)
     speed = SX.sym("speed", cable_count)
     instant = [with_no_wrench(model, speed), reduced.parameters, *instant_symbols.symbols]
@@ -146,7 +146,7 @@ def trajectory_function(
     its end.
     """
     driven = disturbance_symbols(model, noise).driven(model)
-    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    reduced = with_statics_as_parameters(constants_as_parameters(driven, constant_count))
     interval, index = _Interval.of(cable_count), SX.sym("index")
     runge_kutta_step = _runge_kutta_step(reduced, cable_count)
     speeds = interval.speeds_in_part(index, substeps.state)
@@ -171,7 +171,7 @@ def slope_function(
     """
     disturbance = disturbance_symbols(model, noise)
     driven = disturbance.driven(model)
-    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    reduced = with_statics_as_parameters(constants_as_parameters(driven, constant_count))
     speed, later, index = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("index")
     middle = speed + (index + 0.5) / substeps.slope * (later - speed)
     own_count, varied = model.parameters.numel(), reduced.parameters
@@ -201,7 +201,7 @@ def simulation_function(model: SymbolicModel, cable_count: int, substeps: Subste
     x, y, z, the tensions and the rotation vector of this one without delay (m,).
     """
     interval = _Interval.of(cable_count)
-    extended, theta = _with_statics_as_parameters(model), casadi.vertcat(model.parameters, model.static_values)
+    extended, theta = with_statics_as_parameters(model), casadi.vertcat(model.parameters, model.static_values)
     next_state = _moved(extended, theta, interval, substeps.state)
     at_sample = casadi.densify(with_no_wrench(model, interval.speed))
     (outputs,) = casadi.substitute([model.outputs], [model.inputs], [at_sample])
@@ -250,16 +250,6 @@ class _Interval:
         begin, end = (self.speed + (index + k) / count * (self.next_speed - self.speed) for k in (0, 1))
         lines = ((0.0, begin), (0.5, 0.5 * (begin + end)), (1.0, end))
         return [line + bent_by((index + share) / count, *bends) for share, line in lines]
-
-
-def _with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
-    """The model with its static start as further parameters, for rates that are evaluated many times in a sample."""
-    return replace(
-        model,
-        rates=model.rates_by_statics,
-        outputs=model.outputs_by_statics,
-        parameters=casadi.vertcat(model.parameters, model.static_symbols),
-    )
 
 
 def _moved(model: SymbolicModel, theta: SX, interval: _Interval, part_count: int) -> SX:

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -118,8 +119,8 @@ class Likelihood:
         For ``arguments`` (p,) see :meth:`arguments`.
         """
         functions, count, first = self._filter_functions, states.shape[1], len(states) - len(self.uncertain)
-        static_start = functions.static_start(arguments)
-        statics = static_start.values[:, None] + static_start.slopes.T @ states[first:]
+        static_start = functions.static_start(arguments, states[first:, 0])
+        statics = static_start.values[:, None] + static_start.slopes.T @ (states[first:] - states[first:, :1])
         jacobians = functions.rate_jacobian(count, states, arguments[:, None], statics, speed)
         by_state, by_statics = (by_sample(each, count) for each in jacobians)
         by_state[:, :, first:] += by_statics @ static_start.slopes.T
@@ -232,13 +233,16 @@ class Likelihood:
     ) -> Iterator[FilterSegment]:
         columns, is_recorded = filter_columns(recording, *outputs, rotation_count(self.model))
         theta = self.arguments(parameters)
-        static_start = self._filter_functions.static_start(theta)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
         length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
-        for begin in range(0, len(is_recorded), length):
+        size, relinearised = self.model.states.numel(), self._relinearised_samples(len(is_recorded))
+        edges = sorted({*range(0, len(is_recorded), length), *relinearised, len(is_recorded)})
+        for begin, end in pairwise(edges):
             self.poll_interrupts()
-            of_segment = tuple(column[:, begin : begin + length] for column in columns)
+            of_segment = tuple(column[:, begin:end] for column in columns)
+            if begin in relinearised:
+                static_start = self._filter_functions.static_start(theta, now.state[size - len(self.uncertain) : size])
             inputs = FilterInputs(
                 of_segment,
                 theta[:, None],
@@ -248,8 +252,14 @@ class Likelihood:
                 acceleration_noise_density,
             )
             results = self._filter_functions.run(now, inputs, keeps_covariances)
-            yield FilterSegment(of_segment, is_recorded[begin : begin + length], results)
+            yield FilterSegment(of_segment, is_recorded[begin:end], results)
             now = results.end
+
+    def _relinearised_samples(self, count: int) -> set[int]:
+        """Samples at which the static start is taken anew: uncertain constants move most in the first ones."""
+        if not self.uncertain:
+            return {0}
+        return {0, *(10**power for power in range(len(str(count))) if 10**power < count)}
 
     def arguments(self, parameters: Sequence[float] | Array) -> Array:
         """The free parameters, then the constants that are held."""

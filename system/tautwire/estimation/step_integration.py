@@ -105,13 +105,14 @@ class IntegrationBuffers(NamedTuple):
 
 
 class StaticStart(NamedTuple):
-    """Static start as it is linear in the uncertain constants: ``values`` (s) where these are zero.
+    """Static start, linear in the uncertain constants about their ``reference`` (c), where it has its ``values`` (s).
 
-    ``slopes`` are its derivatives by the c constants (c, s), ``by_parameters`` those by parameters (p, s); without
+    ``slopes`` are its derivatives by the constants (c, s), ``by_parameters`` those by parameters (p, s); without
     sensitivities p is 0.
     """
 
     values: Any
+    reference: Any
     slopes: Any
     by_parameters: Any
 
@@ -227,8 +228,9 @@ def set_static_start(integration: Integration, state: Any) -> None:
     assign(statics, static_start.values)
     for i in range(count):
         constants[first + i] = state[moving + i]
+        change = state[moving + i] - static_start.reference[i]
         for j in range(len(statics)):
-            statics[j] += state[moving + i] * static_start.slopes[i, j]
+            statics[j] += change * static_start.slopes[i, j]
 
 
 @compiled

@@ -184,6 +184,16 @@ def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
     )
 
 
+def with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
+    """The model with its static start as further parameters, for what is evaluated many times while that stays."""
+    return replace(
+        model,
+        rates=model.rates_by_statics,
+        outputs=model.outputs_by_statics,
+        parameters=casadi.vertcat(model.parameters, model.static_symbols),
+    )
+
+
 def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
