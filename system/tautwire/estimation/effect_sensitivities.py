@@ -107,7 +107,7 @@ class EffectSensitivities:
         shared_indices = [model.state_names.index(name) for name in state_names]
         effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
         z, p = model.states[effect_indices], model.parameters[: len(free)]
-        theta = casadi.vertcat(model.parameters, *static_start.slopes.nonzeros())
+        theta = casadi.vertcat(model.parameters, SX(static_start.slopes.nz[:]))
         instant = SensorInstant.of(model)
         state_sensitivities = SX.sym("slopes", _sensitivity_pattern(complete.rates[effect_indices], z, p))
         outputs = delayed_outputs(model, cable_count, instant)
@@ -208,7 +208,7 @@ class _StaticStart:
         """Of a model whose last states are uncertain constants."""
         constants = model.states[model.states.numel() - constant_count :]
         by_parameters = casadi.jacobian(model.static_values, model.parameters[:free_count])
-        column = casadi.vertcat(model.static_values, *by_parameters.nonzeros())
+        column = casadi.vertcat(model.static_values, SX(by_parameters.nz[:]))
         function = Function("static_start", [model.parameters, constants], [casadi.densify(column)])
         return cls(SX.sym("slopes_of_start", by_parameters.sparsity()), function)
 
