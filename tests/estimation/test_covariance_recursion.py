@@ -9,7 +9,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from casadi import SX, Function, horzcat, mtimes
+from casadi import SX, Function, horzcat, mtimes, vertcat
 from numpy.typing import NDArray
 
 from tautwire.estimation import covariance_recursion, disturbance_recursion, step_integration
@@ -22,7 +22,7 @@ from tautwire.estimation.covariance_recursion import (
     run_recursion,
 )
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
-from tautwire.estimation.step_integration import Division, Integration, StaticStart, Step, integration_buffers
+from tautwire.estimation.step_integration import Division, Integration, Step, integration_buffers
 
 Array = NDArray[np.float64]
 
@@ -35,13 +35,6 @@ DECAY = np.array([1.0, 1.0, 1.0, 0.7, 0.9])
 PROCESS_NOISE = np.array([0.01, 0.02, 0.0, 0.3, 0.1])
 BY_STATE = GENERATOR.normal(size=(OUTPUTS, SIZE)) * (GENERATOR.random((OUTPUTS, SIZE)) < 0.7)
 BY_PARAMETERS = GENERATOR.normal(size=(OUTPUTS, PARAMETERS))
-# Two numbers of the static start, which the constant and the parameters change.
-STATICS, STATIC_VALUES = 2, np.array([3.0, -1.0])
-STATICS_BY_CONSTANT, STATICS_BY_PARAMETERS = np.array([0.4, -0.7]), GENERATOR.normal(size=(PARAMETERS, 2))
-STATIC_START = StaticStart(
-    STATIC_VALUES + 0.5 * STATICS_BY_CONSTANT, np.array([0.5]), STATICS_BY_CONSTANT[None, :], STATICS_BY_PARAMETERS
-)
-STATES_BY_STATICS, OUTPUTS_BY_STATICS = GENERATOR.normal(size=(MOVING, 2)), GENERATOR.normal(size=(OUTPUTS, 2))
 WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
 MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
 OBSERVED = (GENERATOR.random((COUNT, OUTPUTS)) < 0.8).astype(float)
@@ -57,42 +50,28 @@ START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0
 def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFunction, list[BoundFunction]]:
     """Functions of a sample of a second; rates are constant in it, and their Jacobian is that of one part.
 
-    The constants are two parameters, a driving state, an uncertain constant, and the static start: what this changes is
-    a part of what the latter and the parameters do.
+    The constants are two parameters, a driving state, an uncertain constant, and the states before.
     """
-    x, number = SX.sym("x", SIZE), SX.sym("number")
-    constants, moving = SX.sym("constants", PARAMETERS + 2 + STATICS), SX.sym("moving", MOVING)
-    held, states, outputs = constants[PARAMETERS + 2 :], SX(STATES_BY_STATICS), SX(OUTPUTS_BY_STATICS)
-    other_by_state = BY_STATE.copy()
-    other_by_state[:, MOVING] -= OUTPUTS_BY_STATICS @ STATICS_BY_CONSTANT
-    other_by_parameters = BY_PARAMETERS - OUTPUTS_BY_STATICS @ STATICS_BY_PARAMETERS.T
-    expected = mtimes(SX(other_by_state), x) + mtimes(outputs, held - SX(STATIC_VALUES))
-    output_results = [expected, SX(other_by_state), horzcat(SX(other_by_parameters), outputs)]
-    rates = SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
-    by_constant = SX(TRANSITION[:, MOVING] - STATES_BY_STATICS @ STATICS_BY_CONSTANT)
-    by_driving = SX(TRANSITION[:, MOVING + 1])
-    driven = by_driving * constants[PARAMETERS] + by_constant * constants[PARAMETERS + 1]
-    moved = moving + mtimes(rates, moving) + driven + mtimes(states, held - SX(STATIC_VALUES))
-    by_parameters = SX(DIRECT - STATES_BY_STATICS @ STATICS_BY_PARAMETERS.T)
-    by_constants = horzcat(by_parameters, by_driving, by_constant, states)
+    x, constants, number = SX.sym("x", SIZE), SX.sym("constants", PARAMETERS + 2 + MOVING), SX.sym("number")
+    outputs = Function("outputs", [x], [mtimes(SX(BY_STATE), x), SX(BY_STATE), SX(BY_PARAMETERS)])
+    theta = vertcat(SX(PARAMETERS, 1), x[3], x[2])
+    prepared = [vertcat(theta, x[:MOVING]), SX(MOVING, PARAMETERS + 2), SX(1)]
+    moving, rates = SX.sym("moving", MOVING), SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
+    other = (
+        SX(TRANSITION[:, MOVING]) * constants[PARAMETERS + 1] + SX(TRANSITION[:, MOVING + 1]) * constants[PARAMETERS]
+    )
+    moved = moving + 0.5 * (mtimes(rates, constants[PARAMETERS + 2 :]) + other)
+    by_constants = horzcat(SX(DIRECT), SX(TRANSITION[:, MOVING + 1]), SX(TRANSITION[:, MOVING]), SX(MOVING, MOVING))
     process = Function("process", [number], [SX(DECAY), SX(PROCESS_NOISE)])
-    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, PARAMETERS + 2 + STATICS, 1)]
-    driving = CompiledFunction(Function("driving", [x], [x[3], SX(1)])).bind(count, state[:, None])
+    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, PARAMETERS + 2 + MOVING, 1)]
+    preparation = CompiledFunction(Function("preparation", [x], prepared)).bind(count, state[:, None])
     part = Function("part", [moving, constants, number], [moved])
     slope = Function("slope", [moving, constants, number], [rates, by_constants])
     of_part = CompiledFunction(part).bind(count, buffers[0].T, buffers[2].T, buffers[3])
     of_slope = CompiledFunction(slope).bind(count, buffers[1].T, buffers[2].T, buffers[3])
-    division = Division(1, 1, 1, 0)
+    division = Division(2, 1, 1, 0)
     integration = Integration(
-        step(driving),
-        StaticStart(
-            STATIC_VALUES + 0.5 * STATICS_BY_CONSTANT,
-            np.array([0.5]),
-            STATICS_BY_CONSTANT[None, :],
-            STATICS_BY_PARAMETERS,
-        ),
-        step(of_part),
-        step(of_slope),
+        *(step(each) for each in (preparation, of_part, of_slope)),
         division,
         *buffers,
         np.ones(count),
@@ -100,10 +79,9 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFu
         np.zeros((PARAMETERS, MOVING)),
         integration_buffers(step(of_slope), division),
     )
-    sensing = Function("outputs", [x, constants], output_results)
-    of_outputs = CompiledFunction(sensing).bind(count, state[:, None], buffers[2].T)
+    of_outputs = CompiledFunction(outputs).bind(count, state[:, None])
     of_process = CompiledFunction(process).bind(count, np.zeros((1, count)))
-    return of_outputs, integration, of_process, [driving, of_part, of_slope]
+    return of_outputs, integration, of_process, [preparation, of_part, of_slope]
 
 
 def step(function: BoundFunction) -> Step:

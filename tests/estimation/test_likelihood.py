@@ -11,7 +11,7 @@ from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.integration_steps import Substeps
-from tautwire.estimation.kalman_filter import slope_function, static_start_function
+from tautwire.estimation.kalman_filter import preparation_function, slope_function
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
@@ -55,10 +55,10 @@ def test_a_filter_without_sensitivities_takes_derivatives_by_disturbances_alone(
     noise = replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median)
     model = symbolic_model(ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0})), [FreeParameter(0, "mass")])
     slopes = slope_function(model, 3, noise, Substeps(5, 1), has_sensitivities=False)
-    static_start = static_start_function(model, has_sensitivities=False)
+    preparation = preparation_function(model, noise, has_sensitivities=False)
     forces = 3
     assert slopes.size_out(1) == (model.states.numel(), forces)
-    assert static_start.size_out(1) == (static_start.size_out(0)[0], 0)
+    assert preparation.size_out(1) == (0, forces)
 
 
 def test_slopes_are_the_derivatives_of_the_innovations() -> None:
@@ -154,10 +154,9 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
     def run(begun: np.ndarray) -> FilterResults:
         size = len(begun)
         columns = (unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((0, 1)))
-        functions, nothing = likelihood._filter_functions, np.zeros((0, 1))
-        inputs = FilterInputs(columns, nothing, functions.static_start(nothing, []), nothing, np.ones(11), 0.0)
+        inputs = FilterInputs(columns, np.zeros((0, 1)), np.zeros((0, 1)), np.ones(11), 0.0)
         before = FilterState(begun.ravel(), np.eye(size), np.zeros((size, 0)))
-        return functions.run(before, inputs, keeps_covariances=True)
+        return likelihood._filter_functions.run(before, inputs, keeps_covariances=True)
 
     transition = run(state).transitions[0]
     for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):

@@ -19,17 +19,16 @@ from .covariance_recursion import Functions, Moments, Record, Samples, recursion
 from .integration_steps import Substeps
 from .kalman_filter import (
     Noise,
-    driving_function,
     output_function,
+    preparation_function,
     process_function,
     rate_jacobian_function,
     simulation_function,
     slope_function,
-    static_start_function,
     trajectory_function,
 )
 from .native_functions import BoundFunction, CompiledFunction
-from .step_integration import Division, Integration, StaticStart, Step, integration_buffers
+from .step_integration import Division, Integration, Step, integration_buffers
 
 Array = NDArray[np.float64]
 
@@ -40,14 +39,13 @@ class FilterInputs:
 
     ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), their bends (2 cables, K), time
     step and drift (1, K), and measured rotation (3, K), empty for a point mass, as ``columns``; for the bends see
-    :mod:`tautwire.recordings.speed_interpolation`. The same for all samples are ``parameters`` (p, 1) with their
-    ``static_start``, ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.process_function`), variances of
-    white noise (m,), and the density of acceleration noise.
+    :mod:`tautwire.recordings.speed_interpolation`. The same for all samples are ``parameters``
+    (p, 1), ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.process_function`), variances of white
+    noise (m,), and the density of acceleration noise.
     """
 
     columns: tuple[Array, ...]
     parameters: Array
-    static_start: StaticStart
     disturbance: Array
     white_variances: Array
     acceleration_noise_density: float
@@ -108,7 +106,7 @@ class CompiledFilter:
     @property
     def instruction_count(self) -> int:
         """Instructions of its functions, in proportion to which it takes memory."""
-        functions = (self.outputs, self._driving, self._trajectory, self._slopes, self._process)
+        functions = (self.outputs, self._preparation, self._trajectory, self._slopes, self._process)
         return sum(function.instruction_count for function in functions)
 
     @cached_property
@@ -140,22 +138,18 @@ class CompiledFilter:
         state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
         theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
-        static_start, index = inputs.static_start, np.zeros((1, 1))
-        driving = self._driving.bind(count, state[:, None], step, inputs.disturbance)
-        unset = driving.results[0].shape[1] + self._constant_count + len(static_start.values)
-        constants = np.append(theta.ravel(), np.zeros(unset))[None, :]
-        held = constants[:, constants.shape[1] - len(static_start.values) :].T
-        outputs = self.outputs.bind(count, state[:, None], theta, held, shift, speed, later, step, rotation)
+        outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step, rotation)
+        preparation = self._preparation.bind(count, state[:, None], theta, step, inputs.disturbance)
+        constants, index = np.zeros_like(preparation.results[0]), np.zeros((1, 1))
         moving, middle = np.zeros((2, 1, self.model.states.numel() - self._constant_count))
         part = self._trajectory.bind(count, moving.T, constants.T, speed, later, bends, step, index)
         slope = self._slopes.bind(count, middle.T, constants.T, speed, later, index)
         process = self._process.bind(count, step, drift, density, inputs.disturbance)
         parameter_rows = start.sensitivities.shape[1]
-        driving_count = driving.results[0].shape[1]
+        driving_count = preparation.results[2].shape[1]
         slope_step, division = _step(slope), Division(*astuple(self._substeps))
         integration = Integration(
-            _step(driving),
-            static_start,
+            _step(preparation),
             _step(part),
             slope_step,
             division,
@@ -196,20 +190,10 @@ class CompiledFilter:
             FilterState(state, covariance, sensitivities.T),
         )
 
-    def static_start(self, parameters: Array, constants: Array) -> StaticStart:
-        """The static start at some parameters (p,), linear about some uncertain constants (c,)."""
-        values, slopes = (np.array(each) for each in self._static_start(parameters, constants))
-        by_parameters, by_constants = np.split(slopes.T, [slopes.shape[1] - self._constant_count])
-        derivatives = (np.ascontiguousarray(each) for each in (by_constants, by_parameters))
-        return StaticStart(values.ravel(), np.array(constants, dtype=float), *derivatives)
-
     @cached_property
-    def _static_start(self) -> casadi.Function:
-        return static_start_function(self.model, self._constant_count, self._has_sensitivities)
-
-    @cached_property
-    def _driving(self) -> CompiledFunction:
-        return CompiledFunction(driving_function(self.model, self._noise), max_compiled=sys.maxsize)
+    def _preparation(self) -> CompiledFunction:
+        function = preparation_function(self.model, self._noise, self._constant_count, self._has_sensitivities)
+        return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
     def _trajectory(self) -> CompiledFunction:

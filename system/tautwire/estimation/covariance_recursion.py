@@ -24,7 +24,6 @@ import numpy as np
 from .step_integration import (
     Integration,
     Step,
-    add_product,
     add_to_matrix,
     assign,
     assign_matrix,
@@ -32,18 +31,17 @@ from .step_integration import (
     evaluate,
     integrate_step,
     multiply,
-    set_static_start,
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "883420c31f0ede3d5bfd370def88536614fd4eaa9dc695985df4b316af6aa74a"
+STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
 
 
 class Functions(NamedTuple):
     """Functions of a sample and the state.
 
-    ``outputs`` has the results expected (1, m), by state (n, m) and by parameters and static start (p + s, m);
-    ``process`` decay and process noise (1, n).
+    ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``process`` decay and process
+    noise (1, n).
     """
 
     outputs: Step
@@ -130,9 +128,7 @@ def run_recursion(
         assign(record.states[k], moments.state)
         if len(record.covariances):
             assign_matrix(record.covariances[k], moments.covariance)
-        set_static_start(integration, moments.state)
         evaluate(outputs, k)
-        _add_slopes_of_statics(outputs.results, integration)
         if len(record.output_matrices):
             assign_matrix(record.output_matrices[k], outputs.results[1].T)
         _update_by_measurements(outputs.results, moments, samples, record, buffers, k)
@@ -147,17 +143,6 @@ def run_recursion(
             moments.state[i] *= decay[i]
         assign(moments.state[: integration.moving.shape[1]], integration.moving[0])
     assign(record.states[len(samples.measured)], moments.state)
-
-
-@compiled
-def _add_slopes_of_statics(results: tuple[Any, ...], integration: Integration) -> None:
-    """Add what the outputs change by constants and parameters through the static start."""
-    static_start, moving = integration.static_start, integration.moving.shape[1]
-    by_state, parameter_count = results[1], len(static_start.by_parameters)
-    by_statics = results[2][parameter_count:]
-    if len(by_statics) > 0:
-        add_product(static_start.slopes, by_statics, by_state[moving : moving + len(static_start.slopes)])
-        add_product(static_start.by_parameters, by_statics, results[2][:parameter_count])
 
 
 @compiled

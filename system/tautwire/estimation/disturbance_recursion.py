@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "883420c31f0ede3d5bfd370def88536614fd4eaa9dc695985df4b316af6aa74a"
+STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
 
 
 class DisturbanceStates(NamedTuple):

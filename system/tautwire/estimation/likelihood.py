@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
-from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -33,7 +32,7 @@ from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBAN
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
 from .measurement_model import output_count, rotation_count
-from .native_functions import by_sample
+from .native_functions import CompiledFunction
 
 Array = NDArray[np.float64]
 
@@ -113,18 +112,15 @@ class Likelihood:
         """Instructions of the filter, in proportion to which this takes memory."""
         return self._filter_functions.instruction_count
 
-    def rate_jacobians(self, states: Array, arguments: Array, speed: Array) -> Array:
-        """Jacobians of the rates by the states (K, n, n), at states (n, K) that some speeds (cables, K) move.
+    @property
+    def outputs(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.output_function`."""
+        return self._filter_functions.outputs
 
-        For ``arguments`` (p,) see :meth:`arguments`.
-        """
-        functions, count, first = self._filter_functions, states.shape[1], len(states) - len(self.uncertain)
-        static_start = functions.static_start(arguments, states[first:, 0])
-        statics = static_start.values[:, None] + static_start.slopes.T @ (states[first:] - states[first:, :1])
-        jacobians = functions.rate_jacobian(count, states, arguments[:, None], statics, speed)
-        by_state, by_statics = (by_sample(each, count) for each in jacobians)
-        by_state[:, :, first:] += by_statics @ static_start.slopes.T
-        return by_state
+    @property
+    def rate_jacobian(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
+        return self._filter_functions.rate_jacobian
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
@@ -236,30 +232,19 @@ class Likelihood:
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
         length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
-        size, relinearised = self.model.states.numel(), self._relinearised_samples(len(is_recorded))
-        edges = sorted({*range(0, len(is_recorded), length), *relinearised, len(is_recorded)})
-        for begin, end in pairwise(edges):
+        for begin in range(0, len(is_recorded), length):
             self.poll_interrupts()
-            of_segment = tuple(column[:, begin:end] for column in columns)
-            if begin in relinearised:
-                static_start = self._filter_functions.static_start(theta, now.state[size - len(self.uncertain) : size])
+            of_segment = tuple(column[:, begin : begin + length] for column in columns)
             inputs = FilterInputs(
                 of_segment,
                 theta[:, None],
-                static_start,
                 self.disturbance_arguments,
                 self.noise.white_variances(self.cable_count),
                 acceleration_noise_density,
             )
             results = self._filter_functions.run(now, inputs, keeps_covariances)
-            yield FilterSegment(of_segment, is_recorded[begin:end], results)
+            yield FilterSegment(of_segment, is_recorded[begin : begin + length], results)
             now = results.end
-
-    def _relinearised_samples(self, count: int) -> set[int]:
-        """Samples at which the static start is taken anew: uncertain constants move most in the first ones."""
-        if not self.uncertain:
-            return {0}
-        return {0, *(10**power for power in range(len(str(count))) if 10**power < count)}
 
     def arguments(self, parameters: Sequence[float] | Array) -> Array:
         """The free parameters, then the constants that are held."""

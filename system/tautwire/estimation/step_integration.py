@@ -104,33 +104,19 @@ class IntegrationBuffers(NamedTuple):
     rows: Any
 
 
-class StaticStart(NamedTuple):
-    """Static start, linear in the uncertain constants about their ``reference`` (c), where it has its ``values`` (s).
-
-    ``slopes`` are its derivatives by the constants (c, s), ``by_parameters`` those by parameters (p, s); without
-    sensitivities p is 0.
-    """
-
-    values: Any
-    reference: Any
-    slopes: Any
-    by_parameters: Any
-
-
 class Integration(NamedTuple):
     """Functions that a step is integrated by, what they read, and what comes out.
 
-    ``driving`` gives the means of driving disturbances (1, d) over a step, and the factors (1, d) in these. Constants
-    (1, q) of the others are parameters, these means, uncertain constants, and the static start. ``part`` takes
-    ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope`` gives the Jacobians of the rates at a
-    ``middle`` (1, n) of a part by states (n, n) and by constants (q, n). Without sensitivities the latter are by
-    driving disturbances alone (d, n), and c and p are 0. ``steps`` (K,) are in s. Results: ``moving``, and derivatives
-    of it by the states before, uncertain constants and driving disturbances, ``transition`` (n + c + d, n), and by
-    parameters, ``direct`` (p, n).
+    ``preparation`` gives the constants (1, q) of the others: parameters, driving disturbances, uncertain constants, and
+    the static start, with the derivatives of the latter by the former (q - s, s), and factors (1, d) of the former's
+    driving disturbances. ``part`` takes ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope``
+    gives the Jacobians of the rates at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n). Without
+    sensitivities derivatives are by driving disturbances alone, (d, 0) and (d, n), and c and p are 0.
+    ``steps`` (K,) are in s. Results: ``moving``, and derivatives of it by the states before, uncertain constants and
+    driving disturbances, ``transition`` (n + c + d, n), and by parameters, ``direct`` (p, n).
     """
 
-    driving: Step
-    static_start: StaticStart
+    preparation: Step
     part: Step
     slope: Step
     division: Division
@@ -182,17 +168,6 @@ def multiply(left: Any, right: Any, product: Any) -> None:
 
 
 @compiled
-def add_product(left: Any, right: Any, target: Any) -> None:
-    """Add the product of two matrices to a third."""
-    for r in range(left.shape[0]):
-        for i in range(left.shape[1]):
-            factor = left[r, i]
-            if factor != 0.0:
-                for c in range(right.shape[1]):
-                    target[r, c] += factor * right[i, c]
-
-
-@compiled
 def evaluate(step: Step, k: int) -> None:
     """Evaluate at sample k."""
     _call(step.address, k, step.places, step.strides)
@@ -201,36 +176,11 @@ def evaluate(step: Step, k: int) -> None:
 @compiled
 def integrate_step(integration: Integration, state: Any, k: int) -> None:
     """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones."""
-    evaluate(integration.driving, k)
-    constants, means = integration.constants[0], integration.driving.results[0][0]
-    first_driving = _first_constant(integration) - len(means)
-    for i in range(len(means)):
-        constants[first_driving + i] = means[i]
-    set_static_start(integration, state)
+    evaluate(integration.preparation, k)
+    assign_matrix(integration.constants, integration.preparation.results[0])
     _move(integration, state, k)
     _differentiate(integration, k)
     _fill_in(integration)
-
-
-@compiled
-def _first_constant(integration: Integration) -> int:
-    """Index of the first uncertain constant among the constants of a step."""
-    static_start = integration.static_start
-    return integration.constants.shape[1] - len(static_start.values) - len(static_start.slopes)
-
-
-@compiled
-def set_static_start(integration: Integration, state: Any) -> None:
-    """Set the uncertain constants as a filter's ``state`` has them, and the static start with these."""
-    constants, static_start, first = integration.constants[0], integration.static_start, _first_constant(integration)
-    moving, count = integration.moving.shape[1], len(static_start.slopes)
-    statics = constants[first + count :]
-    assign(statics, static_start.values)
-    for i in range(count):
-        constants[first + i] = state[moving + i]
-        change = state[moving + i] - static_start.reference[i]
-        for j in range(len(statics)):
-            statics[j] += change * static_start.slopes[i, j]
 
 
 @compiled
@@ -295,16 +245,16 @@ def _integrate_exponential(jacobian: Any, part: float, division: Division, buffe
 @compiled
 def _fill_in(integration: Integration) -> None:
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
-    factors, static_start = integration.driving.results[1][0], integration.static_start
+    by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
     by_state, by_constants = integration.buffers.by_state, integration.buffers.by_constants
-    size, driving, constant_count = len(by_state), len(factors), len(static_start.slopes)
-    parameter_count = len(static_start.by_parameters)
-    first_constant = parameter_count + driving
-    theta_count = first_constant + constant_count
-    if theta_count < len(by_constants):
-        add_product(static_start.by_parameters, by_constants[theta_count:], by_constants[:parameter_count])
-        add_product(static_start.slopes, by_constants[theta_count:], by_constants[first_constant:theta_count])
+    theta_count, size, driving = len(by_theta), len(by_state), len(factors)
+    if by_theta.shape[1] > 0:
+        rows = integration.buffers.rows[:theta_count]
+        multiply(by_theta, by_constants[theta_count:], rows)
+        add_to_matrix(by_constants[:theta_count], 1.0, rows)
     result = integration.transition
+    constant_count = len(result) - size - driving
+    first_constant = theta_count - constant_count
     assign_matrix(result[:size], by_state)
     assign_matrix(result[size : size + constant_count], by_constants[first_constant:theta_count])
     for i in range(driving):

@@ -48,8 +48,8 @@ class SymbolicModel:
     ``sensor_delays`` (m) of positions, tensions and rotations in s; ``span_tensions`` (n) of the free spans in N.
     ``start`` is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium;
     ``parameters`` are the free ones. ``reference_orientation`` is the one from which rotations of a rigid body count.
-    ``rates_by_statics`` and ``outputs_by_statics`` have those numbers of the static start that depend on parameters or
-    uncertain states as symbols of their own, ``static_symbols``; ``static_values`` are these.
+    ``rates_by_statics`` are the rates with those numbers of the static start that depend on parameters or uncertain
+    states as symbols of their own, ``static_symbols``; ``static_values`` are these, the same all through a sample.
     """
 
     states: SX
@@ -67,7 +67,6 @@ class SymbolicModel:
     indices: StateIndices
     reference_orientation: Quaternion
     rates_by_statics: SX
-    outputs_by_statics: SX
     static_symbols: SX
     static_values: SX
 
@@ -101,17 +100,16 @@ def symbolic_model(
     lengths, winch_speeds = SX.sym("unstrained_length", count), SX.sym("winch_speed", count)
     variables = MechanicalVariables(platform, lengths, winch_speeds, held.length_shifts)
     effect_states, equations = minimal_equations(replace(assembly, cables=held.cables), variables)
-    by_statics, equations = equations, _with_static_values(equations, held)
+    rates_by_statics, equations = equations.rates, _with_static_values(equations, held)
     start = _nominal_start(_initial_state(assembly, statics.rotation, len(effect_states)), constants)
     no_rates, indices = SX(len(constants), 1), StateIndices(platform.pose.numel(), count)
     first_effect_state = variables.states.numel()
-    errors = sensor_errors(uncertain_parameters, perturbations, count)
     return SymbolicModel(
         states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *constants),
         inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
         rates=casadi.vertcat(equations.rates, no_rates),
-        outputs=_shown(equations.outputs, indices, errors),
+        outputs=_shown(equations.outputs, indices, sensor_errors(uncertain_parameters, perturbations, count)),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly, platform.pose.numel() - 3),
         start=casadi.vertcat(start, no_rates),
@@ -125,8 +123,7 @@ def symbolic_model(
         output_names=variables.output_names,
         indices=indices,
         reference_orientation=reference,
-        rates_by_statics=casadi.vertcat(by_statics.rates, no_rates),
-        outputs_by_statics=_shown(by_statics.outputs, indices, errors),
+        rates_by_statics=casadi.vertcat(rates_by_statics, no_rates),
         static_symbols=held.symbols,
         static_values=held.values,
     )
@@ -184,16 +181,6 @@ def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
     )
 
 
-def with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
-    """The model with its static start as further parameters, for what is evaluated many times while that stays."""
-    return replace(
-        model,
-        rates=model.rates_by_statics,
-        outputs=model.outputs_by_statics,
-        parameters=casadi.vertcat(model.parameters, model.static_symbols),
-    )
-
-
 def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
@@ -201,16 +188,15 @@ def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     settling_indices = [index for index in range(model.states.numel()) if index not in model.drifting]
     frozen_states = model.states[list(model.drifting)]
     expressions = [model.rates[settling_indices], model.outputs, model.span_tensions]
-    expressions += [model.rates_by_statics[settling_indices], model.outputs_by_statics]
-    rates, outputs, tensions, *by_statics = casadi.substitute(
+    expressions.append(model.rates_by_statics[settling_indices])
+    rates, outputs, tensions, by_statics = casadi.substitute(
         expressions, [frozen_states], [SX.zeros(*frozen_states.shape)]
     )
     return replace(
         model,
         states=model.states[settling_indices],
         rates=rates,
-        rates_by_statics=by_statics[0],
-        outputs_by_statics=by_statics[1],
+        rates_by_statics=by_statics,
         outputs=outputs,
         span_tensions=tensions,
         start=model.start[settling_indices],
