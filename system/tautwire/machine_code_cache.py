@@ -24,7 +24,7 @@ DIGEST_BYTES = 32
 
 
 def cached_machine_code(content: bytes, compile_content: Callable[[], bytes], max_bytes: int = MAX_BYTES) -> bytes:
-    """Machine code of some content, or what else is made of it, only where the cache has none.
+    """Machine code of some content, compiled only where the cache has none.
 
     ``content`` has to tell everything that the code depends on, the processor included.
     """

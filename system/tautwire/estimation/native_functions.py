@@ -12,8 +12,6 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
-from pathlib import Path
 
 import casadi
 import llvmlite
@@ -22,7 +20,7 @@ import numpy as np
 from casadi import Function
 from numpy.typing import NDArray
 
-from ..machine_code_cache import DIGEST_BYTES, cached_machine_code
+from ..machine_code_cache import cached_machine_code
 from .llvm_assembly import llvm_assembly
 
 Array = NDArray[np.float64]
@@ -66,7 +64,9 @@ class CompiledFunction:
         self._interpreted_function = None if self.instruction_count <= max_compiled else dense
         if self._interpreted_function is None:
             # The machine code lives as long as its engine.
-            self._engine, self._constants = _engine(dense)
+            text, constants = llvm_assembly(dense)
+            self._engine = _engine(text)
+            self._constants = np.array(constants)
             self._native_run = RUN_PROTOTYPE(self._engine.get_function_address("run"))
 
     def __call__(self, count: int, *arguments: Array) -> list[Array]:
@@ -163,40 +163,22 @@ def _dense(function: Function) -> Function:
     return Function(function.name(), arguments, [casadi.densify(result) for result in results])
 
 
-def _engine(function: Function) -> tuple[llvm.ExecutionEngine, Array]:
-    """A dense function as machine code, and its constants.
-
-    To write the assembly takes four times as long as to read what CasADi keeps of a function, so what is known of
-    that is which code it has: a digest of the assembly, and the constants. LLVM's own form of the assembly is some
-    thirty times as large, and freed at once.
-    """
+def _engine(text: str) -> llvm.ExecutionEngine:
+    """The assembly as machine code. LLVM's own form of it is some thirty times as large, and freed at once."""
     processor, features = _processor()
     machine = llvm.Target.from_default_triple().create_target_machine(opt=0, cpu=processor, features=features)
-    translation = cache(lambda: llvm_assembly(function))
-
-    def translate() -> bytes:
-        text, constants = translation()
-        return sha256(text.encode()).digest() + np.array(constants).tobytes()
 
     def compile_text() -> bytes:
         # Constants would stay in the global context.
-        with llvm.parse_assembly(translation()[0], llvm.create_context()) as module:
+        with llvm.parse_assembly(text, llvm.create_context()) as module:
             return bytes(machine.emit_object(module))
 
-    digest_and_constants = cached_machine_code(_translator() + function.serialize().encode(), translate)
-    digest, constants = digest_and_constants[:DIGEST_BYTES], np.frombuffer(digest_and_constants[DIGEST_BYTES:])
     versions = [llvmlite.__version__, ".".join(map(str, llvm.llvm_version_info)), machine.triple, processor, features]
-    code = cached_machine_code("\n".join([*versions, digest.hex()]).encode(), compile_text)
+    code = cached_machine_code("\n".join([*versions, text]).encode(), compile_text)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
-    return engine, constants
-
-
-@cache
-def _translator() -> bytes:
-    """What the assembly of a function depends on beside it."""
-    return casadi.CasadiMeta.version().encode() + Path(llvm_assembly.__code__.co_filename).read_bytes()
+    return engine
 
 
 @cache
