@@ -12,7 +12,7 @@ from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting
+from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from tautwire.robot.symbolic_model import FreeParameter
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -24,13 +24,21 @@ NOISE = estimate_noise(ROBOT, RECORDING)
 LENGTHS = replace(NOISE, rope_lengths=(OrnsteinUhlenbeck(3e-4, 1.0),) * 3)
 INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
 EVERYWHERE = (1, 2, 3)
+SURVEYED = replace(
+    ROBOT,
+    cables=tuple(
+        replace(cable, anchor_uncertainty=3e-3, modulus_uncertainty=0.05 * cable.modulus) for cable in ROBOT.cables
+    ),
+)
 
 
-def along(name: str, form: tuple[str, ...], trial: dict[str, float], noise: Noise = NOISE) -> np.ndarray:
+def along(
+    name: str, form: tuple[str, ...], trial: dict[str, float], noise: Noise = NOISE, declared: Robot = ROBOT
+) -> np.ndarray:
     """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
-    likelihood = Likelihood(ROBOT, (), noise, INTERVAL)
+    likelihood = Likelihood(declared, (), noise, INTERVAL)
     directions = EffectSensitivities(
-        ROBOT, BY_NAME[name], [(cable,) for cable in EVERYWHERE], [form], [trial], likelihood.model.state_names
+        declared, BY_NAME[name], [(cable,) for cable in EVERYWHERE], [form], [trial], likelihood.model.state_names
     )
     slopes, parts = directions.start_sensitivities, []
     for run in linearise_filter(likelihood, [], RECORDING):
@@ -40,18 +48,29 @@ def along(name: str, form: tuple[str, ...], trial: dict[str, float], noise: Nois
     return np.concatenate(parts)
 
 
-def exact(name: str, parameter: str, trial: dict[str, float], noise: Noise = NOISE) -> np.ndarray:
+def exact(
+    name: str, parameter: str, trial: dict[str, float], noise: Noise = NOISE, declared_robot: Robot = ROBOT
+) -> np.ndarray:
     """The same for one parameter on all cables, by the filter's own sensitivities."""
     effect = BY_NAME[name]
     declared = {p.name: 0.0 for p in effect.parameters if p.neutral is None}
     cables = EVERYWHERE if effect.component in PER_CABLE_COMPONENTS else ()
-    robot = ROBOT.with_effect(EffectSetting(name, effect.completed_values({**declared, **trial}), cables))
+    robot = declared_robot.with_effect(EffectSetting(name, effect.completed_values({**declared, **trial}), cables))
     values = [robot.effects[0].values[parameter]]
     if effect.parameters[0].neutral is None:
         values = [float(getattr(ROBOT.cables[0], parameter))]
     return (
         Likelihood(robot, [FreeParameter(0, parameter)], noise, INTERVAL).innovations(RECORDING, values).sensitivities
     )
+
+
+@pytest.mark.parametrize("name", ["payload", "drag"])
+def test_slopes_are_those_of_the_filter_itself_beside_uncertain_anchors(name: str) -> None:
+    """The filter moves the anchors on the way, and with them the static start."""
+    parameter = {"payload": "mass", "drag": "drag_area"}[name]
+    slopes = along(name, (parameter,), {}, declared=SURVEYED)[:, :, 0]
+    expected = exact(name, parameter, {}, declared_robot=SURVEYED)[:, :, 0]
+    assert np.max(np.abs(slopes - expected)) < 1e-3 * np.max(np.abs(expected))
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,17 @@ def test_slopes_are_the_derivatives_of_the_innovations() -> None:
         assert np.max(np.abs(difference - slopes[:, :, index])) < 0.02 * np.max(np.abs(difference))
 
 
+def test_slopes_beside_uncertain_anchors_are_the_derivatives_of_the_innovations() -> None:
+    """The filter moves the anchors on the way, and with them the static start, which the load has a part in too."""
+    surveyed = replace(ROBOT, cables=tuple(replace(cable, anchor_uncertainty=3e-3) for cable in ROBOT.cables))
+    likelihood = Likelihood(surveyed.with_effect(EffectSetting("payload", {"mass": 0.0})), (MASS,), NOISE, 0.02)
+    short = RECORDING.first(400)
+    slopes = likelihood.innovations(short, [0.0]).sensitivities[:, :, 0]
+    more, less = (likelihood.innovations(short, [mass]).values for mass in (1e-4, -1e-4))
+    error = (more - less) / 2e-4 - slopes
+    assert np.linalg.norm(error) < 0.03 * np.linalg.norm(slopes)
+
+
 def test_noise_of_winch_speeds_reaches_tensions_alike_by_damping_and_by_relaxation_in_no_time() -> None:
     more_damping, time = 5e8, 1e-3
     declared = ROBOT.cables[0].damping
