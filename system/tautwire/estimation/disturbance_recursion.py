@@ -10,8 +10,8 @@ factor ``L`` of ``C P C' + R``, whitened innovations ``v``, ``W = L^-1 C``, ``G 
     P_j' = A P_j A' + K R_j K' + T_j P+ T' + T P+ T_j' + Q_j
 
 where ``l`` are the logs of the innovations' variances, ``Phi`` takes the lower triangle with half of the diagonal, and
-of the updated moments ``x+`` and ``P+`` the latter need not be known: ``P+ T' = P A'``. Products with the covariances
-of all numbers at once take most of the time, which a library for small matrices takes several times less of than loops.
+of the updated moments ``x+`` and ``P+`` the latter need not be known: ``P+ T' = P A'``. Most of the time goes into
+products with the covariances of all numbers at once, which BLAS does several times as fast as loops.
 
 Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783; Särkkä (2013), Bayesian Filtering
 and Smoothing, sec. 12.3 and appendix A.3.
@@ -97,23 +97,10 @@ class Buffers(NamedTuple):
 
 
 def recursion_buffers(disturbance: DisturbanceStates, derivatives: Derivatives) -> Buffers:
+    """Buffers for a disturbance's states and numbers."""
     (k, n), m = derivatives.state.shape, len(disturbance.white_number)
     d = np.count_nonzero(disturbance.rms_number >= 0)
-    shapes = [
-        (m, n),
-        (m, n),
-        (n, m),
-        (m, m),
-        (m, m),
-        (n, m),
-        (n, m),
-        (n, m),
-        (n, n),
-        (n, n + m),
-        (d, n),
-        (k, n),
-        (k, m),
-    ]
+    shapes = [*[(m, n)] * 2, (n, m), *[(m, m)] * 2, *[(n, m)] * 3, (n, n), (n, n + m), (d, n), (k, n), (k, m)]
     crossed, moved = np.empty((m, k * n)), np.zeros((n + m, k * n))
     arrays = [*map(np.empty, shapes), crossed, crossed.reshape((m * k, n)), np.empty((m * k, m))]
     arrays += [moved, moved[:n].reshape((n * k, n)), derivatives.covariance.reshape((n * k, n))]
@@ -128,7 +115,6 @@ def differentiate_recursion(
     size = derivatives.state.shape[1]
     first = size - len(buffers.processes)
     for k in range(len(run.values)):
-        covariance, transition = run.covariances[k], run.transitions[k]
         _set_gains(run, disturbance, buffers, k)
         multiply(buffers.whitened, derivatives.covariance, buffers.crossed)
         multiply(buffers.crossed_rows, buffers.by_state, buffers.crossed_variances)
@@ -144,12 +130,9 @@ def differentiate_recursion(
         multiply(buffers.covariance_rows, buffers.onward, buffers.moved_rows)
         _add_white_noise(run.values[k], disturbance, derivatives, buffers)
         multiply(buffers.factors, buffers.moved, derivatives.covariance)
-        multiply(covariance[first:], buffers.onward, buffers.processes)
+        multiply(run.covariances[k, first:], buffers.onward, buffers.processes)
         for i in range(first, size):
-            updated = run.states[k, i]
-            for o in range(len(buffers.whitened)):
-                updated += buffers.gain[i, o] * run.values[k, o]
-            _add_process(transition, i, updated, run.steps[k], disturbance, derivatives, buffers)
+            _add_process(run, k, i, disturbance, derivatives, buffers)
 
 
 @compiled
@@ -240,18 +223,16 @@ def _add_white_noise(
 
 @compiled
 def _add_process(
-    transition: Any,
-    i: int,
-    updated: float,
-    step: float,
-    disturbance: DisturbanceStates,
-    derivatives: Derivatives,
-    buffers: Buffers,
+    run: Run, k: int, i: int, disturbance: DisturbanceStates, derivatives: Derivatives, buffers: Buffers
 ) -> None:
-    """Add what decay and size of the process in state i, ``updated`` by measurements, change in a step."""
-    size, rms, covariance = len(transition), disturbance.rms_number[i], derivatives.covariance
+    """Add what decay and size of the process in state i change in the step from sample k."""
+    transition, rms, covariance = run.transitions[k], disturbance.rms_number[i], derivatives.covariance
+    size = len(transition)
     process, bandwidth = i - size + len(buffers.processes), (rms + 1) * size
-    exponent = disturbance.decay_rate[i] * step
+    exponent = disturbance.decay_rate[i] * run.steps[k]
+    updated = run.states[k, i]
+    for o in range(len(buffers.whitened)):
+        updated += buffers.gain[i, o] * run.values[k, o]
     for r in range(size):
         # A force's mean over a step has decayed half as far.
         slope = -exponent * transition[r, i] if r == i else -0.5 * exponent * transition[r, i]
