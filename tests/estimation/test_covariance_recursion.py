@@ -35,6 +35,10 @@ DECAY = np.array([1.0, 1.0, 1.0, 0.7, 0.9])
 PROCESS_NOISE = np.array([0.01, 0.02, 0.0, 0.3, 0.1])
 BY_STATE = GENERATOR.normal(size=(OUTPUTS, SIZE)) * (GENERATOR.random((OUTPUTS, SIZE)) < 0.7)
 BY_PARAMETERS = GENERATOR.normal(size=(OUTPUTS, PARAMETERS))
+# Two numbers of the static start, which the constant and the parameters change.
+STATICS, STATIC_VALUES = 2, np.array([3.0, -1.0])
+STATICS_BY_CONSTANT, STATICS_BY_PARAMETERS = np.array([0.4, -0.7]), GENERATOR.normal(size=(PARAMETERS, 2))
+STATES_BY_STATICS, OUTPUTS_BY_STATICS = GENERATOR.normal(size=(MOVING, 2)), GENERATOR.normal(size=(OUTPUTS, 2))
 WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
 MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
 OBSERVED = (GENERATOR.random((COUNT, OUTPUTS)) < 0.8).astype(float)
@@ -50,28 +54,43 @@ START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0
 def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFunction, list[BoundFunction]]:
     """Functions of a sample of a second; rates are constant in it, and their Jacobian is that of one part.
 
-    The constants are two parameters, a driving state, an uncertain constant, and the states before.
+    The constants are two parameters, a driving state, an uncertain constant, and the static start: what this changes is
+    a part of what the latter and the parameters do.
     """
-    x, constants, number = SX.sym("x", SIZE), SX.sym("constants", PARAMETERS + 2 + MOVING), SX.sym("number")
-    outputs = Function("outputs", [x], [mtimes(SX(BY_STATE), x), SX(BY_STATE), SX(BY_PARAMETERS)])
-    theta = vertcat(SX(PARAMETERS, 1), x[3], x[2])
-    prepared = [vertcat(theta, x[:MOVING]), SX(MOVING, PARAMETERS + 2), SX(1)]
-    moving, rates = SX.sym("moving", MOVING), SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
-    other = (
-        SX(TRANSITION[:, MOVING]) * constants[PARAMETERS + 1] + SX(TRANSITION[:, MOVING + 1]) * constants[PARAMETERS]
-    )
-    moved = moving + 0.5 * (mtimes(rates, constants[PARAMETERS + 2 :]) + other)
-    by_constants = horzcat(SX(DIRECT), SX(TRANSITION[:, MOVING + 1]), SX(TRANSITION[:, MOVING]), SX(MOVING, MOVING))
+    x, number, held_numbers = SX.sym("x", SIZE), SX.sym("number"), SX.sym("held", STATICS)
+    constants, moving = SX.sym("constants", PARAMETERS + 2 + STATICS), SX.sym("moving", MOVING)
+    held, states, outputs = constants[PARAMETERS + 2 :], SX(STATES_BY_STATICS), SX(OUTPUTS_BY_STATICS)
+    other_by_state = BY_STATE.copy()
+    other_by_state[:, MOVING] -= OUTPUTS_BY_STATICS @ STATICS_BY_CONSTANT
+    other_by_parameters = BY_PARAMETERS - OUTPUTS_BY_STATICS @ STATICS_BY_PARAMETERS.T
+    expected = mtimes(SX(other_by_state), x) + mtimes(outputs, held_numbers - SX(STATIC_VALUES))
+    output_results = [expected, SX(other_by_state), horzcat(SX(other_by_parameters), outputs)]
+    rates = SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
+    by_constant = SX(TRANSITION[:, MOVING] - STATES_BY_STATICS @ STATICS_BY_CONSTANT)
+    by_driving = SX(TRANSITION[:, MOVING + 1])
+    driven = by_driving * constants[PARAMETERS] + by_constant * constants[PARAMETERS + 1]
+    moved = moving + mtimes(rates, moving) + driven + mtimes(states, held - SX(STATIC_VALUES))
+    by_parameters = SX(DIRECT - STATES_BY_STATICS @ STATICS_BY_PARAMETERS.T)
+    by_constants = horzcat(by_parameters, by_driving, by_constant, states)
     process = Function("process", [number], [SX(DECAY), SX(PROCESS_NOISE)])
-    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, PARAMETERS + 2 + MOVING, 1)]
-    preparation = CompiledFunction(Function("preparation", [x], prepared)).bind(count, state[:, None])
+    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, 1)]
+    constant, by_others = SX.sym("constant"), horzcat(SX(STATICS_BY_PARAMETERS.T), SX(STATICS_BY_CONSTANT))
+    statics = Function("statics", [constant], [SX(STATIC_VALUES) + SX(STATICS_BY_CONSTANT) * constant, by_others])
+    static_start = CompiledFunction(statics).bind(count, state[MOVING : MOVING + 1, None])
+    static_values = static_start.results[0].T
+    prepared = Function("preparation", [x, held_numbers], [vertcat(SX(PARAMETERS, 1), x[3], x[2], held_numbers), SX(1)])
+    preparation = CompiledFunction(prepared).bind(count, state[:, None], static_values)
     part = Function("part", [moving, constants, number], [moved])
     slope = Function("slope", [moving, constants, number], [rates, by_constants])
-    of_part = CompiledFunction(part).bind(count, buffers[0].T, buffers[2].T, buffers[3])
-    of_slope = CompiledFunction(slope).bind(count, buffers[1].T, buffers[2].T, buffers[3])
-    division = Division(2, 1, 1, 0)
+    of_part = CompiledFunction(part).bind(count, buffers[0].T, preparation.results[0].T, buffers[2])
+    of_slope = CompiledFunction(slope).bind(count, buffers[1].T, preparation.results[0].T, buffers[2])
+    division = Division(1, 1, 1, 0)
     integration = Integration(
-        *(step(each) for each in (preparation, of_part, of_slope)),
+        step(static_start),
+        1,
+        step(preparation),
+        step(of_part),
+        step(of_slope),
         division,
         *buffers,
         np.ones(count),
@@ -79,9 +98,10 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFu
         np.zeros((PARAMETERS, MOVING)),
         integration_buffers(step(of_slope), division),
     )
-    of_outputs = CompiledFunction(outputs).bind(count, state[:, None])
+    sensing = Function("outputs", [x, held_numbers], output_results)
+    of_outputs = CompiledFunction(sensing).bind(count, state[:, None], static_values)
     of_process = CompiledFunction(process).bind(count, np.zeros((1, count)))
-    return of_outputs, integration, of_process, [preparation, of_part, of_slope]
+    return of_outputs, integration, of_process, [static_start, preparation, of_part, of_slope]
 
 
 def step(function: BoundFunction) -> Step:
@@ -100,7 +120,7 @@ def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
     )
     outputs, integration, process, _owners = bound(COUNT, moments.state)
     samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
-    buffers = recursion_buffers(OUTPUTS, SIZE, PARAMETERS, integration.transition)
+    buffers = recursion_buffers(OUTPUTS, SIZE, PARAMETERS, integration)
     run_recursion(Functions(step(outputs), step(process)), integration, moments, samples, record, buffers)
     return moments, record
 

@@ -11,7 +11,7 @@ from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.integration_steps import Substeps
-from tautwire.estimation.kalman_filter import preparation_function, slope_function
+from tautwire.estimation.kalman_filter import slope_function, static_start_function
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
@@ -55,10 +55,10 @@ def test_a_filter_without_sensitivities_takes_derivatives_by_disturbances_alone(
     noise = replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median)
     model = symbolic_model(ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0})), [FreeParameter(0, "mass")])
     slopes = slope_function(model, 3, noise, Substeps(5, 1), has_sensitivities=False)
-    preparation = preparation_function(model, noise, has_sensitivities=False)
+    static_start = static_start_function(model, has_sensitivities=False)
     forces = 3
     assert slopes.size_out(1) == (model.states.numel(), forces)
-    assert preparation.size_out(1) == (0, forces)
+    assert static_start.size_out(1) == (static_start.size_out(0)[0], 0)
 
 
 def test_slopes_are_the_derivatives_of_the_innovations() -> None:

@@ -8,7 +8,13 @@ import pytest
 from casadi import SX, Function
 
 from tautwire.estimation.integration_steps import Substeps
-from tautwire.estimation.kalman_filter import output_function, preparation_function, slope_function, trajectory_function
+from tautwire.estimation.kalman_filter import (
+    output_function,
+    preparation_function,
+    slope_function,
+    static_start_function,
+    trajectory_function,
+)
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.native_functions import CompiledFunction, by_sample
 from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
@@ -109,12 +115,14 @@ def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: 
     start = np.array(Function("start", [model.parameters], [model.start])(theta))
     speeds = (recording.winch_speed[:count].T, recording.winch_speed[1 : count + 1].T)
     bends, step = np.full((6, 1), 1e-3), np.diff(recording.time[: count + 1])[None, :]
-    substeps = Substeps(5, 1)
-    (constants,) = preparation_function(model, noise).call([start, theta, 0.02, []])[:1]
-    moving, zero = (start, np.array(constants)), np.zeros((1, 1))
+    substeps, nothing, zero = Substeps(5, 1), np.zeros((0, 1)), np.zeros((1, 1))
+    statics = np.array(static_start_function(model).call([theta, []])[0])
+    constants, _ = preparation_function(model, noise).call([start, theta, statics, 0.02, []])
+    moving = (start, np.array(constants))
     for function, columns in (
-        (output_function(model, 3, noise), (start, theta, np.zeros((6, 1)), *speeds, step, np.zeros((0, 1)))),
-        (preparation_function(model, noise), (start, theta, step, np.zeros((0, 1)))),
+        (output_function(model, 3, noise), (start, theta, statics, np.zeros((6, 1)), *speeds, step, nothing)),
+        (static_start_function(model), (np.tile(theta, count), nothing)),
+        (preparation_function(model, noise), (start, theta, statics, step, nothing)),
         (trajectory_function(model, 3, noise, substeps), (*moving, *speeds, bends, step, zero)),
         (slope_function(model, 3, noise, substeps), (*moving, *speeds, zero)),
     ):

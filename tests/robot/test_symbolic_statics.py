@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import casadi
 import numpy as np
 import pytest
+from casadi import SX
 from scipy.spatial.transform import Rotation
 
 from tautwire.robot.rigid_equilibrium import static_equilibrium
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
+from tautwire.robot.symbolic_statics import ImplicitRoot
+from tautwire.robot.uncertain_parameters import uncertain_parameters
 from tautwire_fmu.laws.effects import BY_NAME
-from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot, underactuated_robot
+from tests.support.rigid_robots import crane_robot, hung_beam, octahedral_robot, suspended_robot, underactuated_robot
 
 
 def with_value(robot: Robot, effect: str, parameter: str, value: float) -> Robot:
@@ -65,3 +70,53 @@ def test_the_first_derivative_of_an_orientation_is_that_of_statics() -> None:
     )
     expected = (more * less.inv()).as_rotvec() / (2.0 * width)
     assert np.array(slopes(0.0)).ravel() == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.max(np.abs(expected)))
+
+
+def surveyed(robot: Robot) -> Robot:
+    """A robot whose geometry is known to a centimetre."""
+    return replace(
+        robot,
+        cables=tuple(replace(cable, anchor_uncertainty=1e-2, attachment_uncertainty=1e-2) for cable in robot.cables),
+    )
+
+
+def balanced_beam() -> Robot:
+    """Two cables that hold a platform level with its centre of mass: it turns freely about the line through both."""
+    beam = hung_beam()
+    return replace(beam, platform=replace(beam.platform, centre_of_mass=(0.0, 0.0, 0.1)))
+
+
+@pytest.mark.parametrize(
+    ("robot", "distance"),
+    [
+        (balanced_beam(), 0.0),
+        (hung_beam(), 3.0),
+        (suspended_robot(3), 3.0),
+        (underactuated_robot(), 3.0),
+        (crane_robot(), 3.0),
+    ],
+    ids=["neutral axis", "two cables", "three cables", "four cables", "eight cables"],
+)
+def test_derivatives_of_the_static_start_are_differences_of_its_values_far_from_the_declared_numbers_too(
+    robot: Robot, distance: float
+) -> None:
+    heavier = with_value(surveyed(robot), "payload", "mass", 1.0)
+    uncertain = uncertain_parameters(heavier)
+    model = symbolic_model(heavier, [FreeParameter(0, "mass")], uncertain, robot.platform.start_orientation)
+    others = casadi.vertcat(model.parameters, model.states[model.states.numel() - len(uncertain) :])
+    results = [model.static_start.values, model.static_start.jacobian(others)]
+    static_start, count, width = casadi.Function("static_start", [others], results), others.numel(), 1e-5
+    point = np.append(1.0 + distance, distance * np.random.default_rng(1).normal(size=count - 1))
+    slopes = np.array(static_start(point)[1])
+    for number, step in enumerate(width * np.eye(count)):
+        more, less = (np.array(static_start(point + sign * step)[0]).ravel() for sign in (1.0, -1.0))
+        assert slopes[:, number] == pytest.approx((more - less) / (2.0 * width), rel=1e-5, abs=1e-5)
+    assert np.linalg.matrix_rank(slopes) > 3
+
+
+def test_of_a_root_that_is_not_the_only_one_the_derivative_is_the_smallest() -> None:
+    unknowns, parameter = SX.sym("z", 2), SX.sym("p")
+    inverse = np.array([[0.5], [0.5]])
+    values, equations = casadi.vertcat(0.5 * parameter, 0.5 * parameter), casadi.sum1(unknowns) - parameter
+    root = ImplicitRoot(unknowns, values, equations, inverse, inverse @ np.array([[1.0, 1.0]]))
+    assert np.array(casadi.Function("slope", [unknowns], [root.jacobian(parameter)])(0.0)).ravel() == pytest.approx(0.5)

@@ -25,6 +25,7 @@ from .kalman_filter import (
     rate_jacobian_function,
     simulation_function,
     slope_function,
+    static_start_function,
     trajectory_function,
 )
 from .native_functions import BoundFunction, CompiledFunction
@@ -106,13 +107,19 @@ class CompiledFilter:
     @property
     def instruction_count(self) -> int:
         """Instructions of its functions, in proportion to which it takes memory."""
-        functions = (self.outputs, self._preparation, self._trajectory, self._slopes, self._process)
+        functions = (self.outputs, self.static_start, self._preparation, self._trajectory, self._slopes, self._process)
         return sum(function.instruction_count for function in functions)
 
     @cached_property
     def outputs(self) -> CompiledFunction:
         """See :func:`tautwire.estimation.kalman_filter.output_function`."""
         function = output_function(self.model, self._cable_count, self._noise, self._has_sensitivities)
+        return CompiledFunction(function, max_compiled=sys.maxsize)
+
+    @cached_property
+    def static_start(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.static_start_function`."""
+        function = static_start_function(self.model, self._constant_count, self._has_sensitivities)
         return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
@@ -138,24 +145,28 @@ class CompiledFilter:
         state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
         theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
-        outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step, rotation)
-        preparation = self._preparation.bind(count, state[:, None], theta, step, inputs.disturbance)
-        constants, index = np.zeros_like(preparation.results[0]), np.zeros((1, 1))
-        moving, middle = np.zeros((2, 1, self.model.states.numel() - self._constant_count))
+        first = self.model.states.numel() - self._constant_count
+        static_start = self.static_start.bind(count, theta, state[first : first + self._constant_count, None])
+        held = static_start.results[0].T
+        outputs = self.outputs.bind(count, state[:, None], theta, held, shift, speed, later, step, rotation)
+        preparation = self._preparation.bind(count, state[:, None], theta, held, step, inputs.disturbance)
+        constants, index = preparation.results[0], np.zeros((1, 1))
+        moving, middle = np.zeros((2, 1, first))
         part = self._trajectory.bind(count, moving.T, constants.T, speed, later, bends, step, index)
         slope = self._slopes.bind(count, middle.T, constants.T, speed, later, index)
         process = self._process.bind(count, step, drift, density, inputs.disturbance)
         parameter_rows = start.sensitivities.shape[1]
-        driving_count = preparation.results[2].shape[1]
+        driving_count = preparation.results[1].shape[1]
         slope_step, division = _step(slope), Division(*astuple(self._substeps))
         integration = Integration(
+            _step(static_start),
+            self._constant_count,
             _step(preparation),
             _step(part),
             slope_step,
             division,
             moving,
             middle,
-            constants,
             index,
             np.ascontiguousarray(step[0]),
             np.empty((self.model.states.numel() + driving_count, moving.shape[1])),
@@ -175,7 +186,7 @@ class CompiledFilter:
         )
         moments = Moments(state, covariance, sensitivities)
         samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
-        buffers = recursion_buffers(output_count, size, parameter_count, integration.transition)
+        buffers = recursion_buffers(output_count, size, parameter_count, integration)
         run_recursion(Functions(_step(outputs), _step(process)), integration, moments, samples, record, buffers)
         with np.errstate(invalid="ignore", divide="ignore"):
             log_variances = np.log(record.variances)
@@ -192,7 +203,7 @@ class CompiledFilter:
 
     @cached_property
     def _preparation(self) -> CompiledFunction:
-        function = preparation_function(self.model, self._noise, self._constant_count, self._has_sensitivities)
+        function = preparation_function(self.model, self._noise, self._constant_count)
         return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
@@ -215,10 +226,13 @@ def _settling_states(model: SymbolicModel, constant_count: int) -> tuple[NDArray
     """Internal states of ropes that have an equilibrium, and the slopes of their rates at the start by all states."""
     internal = range(model.indices.lengths.stop, model.states.numel() - constant_count)
     settling = [index for index in internal if index not in model.drifting]
-    slopes = casadi.jacobian(model.rates[settling], model.states) if settling else SX(0, model.states.numel())
+    rates, statics = model.rates_by_statics[settling] if settling else SX(0, 1), model.static_start
+    through_statics = casadi.mtimes(casadi.jacobian(rates, statics.symbols), statics.jacobian(model.states))
+    slopes = casadi.jacobian(rates, model.states) + through_statics
     at_rest = [casadi.densify(model.start), SX.zeros(*model.inputs.shape)]
-    at_start = casadi.substitute([slopes], [model.states, model.inputs], at_rest)
-    return np.array(settling, dtype=int), casadi.Function("settling_slopes", [model.parameters], at_start)
+    (at_start,) = casadi.substitute([slopes], [statics.symbols], [statics.values])
+    (at_start,) = casadi.substitute([at_start], [model.states, model.inputs], at_rest)
+    return np.array(settling, dtype=int), casadi.Function("settling_slopes", [model.parameters], [at_start])
 
 
 def _step(function: BoundFunction) -> Step:

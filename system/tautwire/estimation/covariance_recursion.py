@@ -34,14 +34,14 @@ from .step_integration import (
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
+STEP_INTEGRATION_SHA256 = "ea93b8b956803d8a0a3ceddcc3dd3a0ffa87dbc13cbbc49f7cfdd7c95dcc286b"
 
 
 class Functions(NamedTuple):
     """Functions of a sample and the state.
 
-    ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``process`` decay and process
-    noise (1, n).
+    ``outputs`` has the results expected (1, m), by state (n, m) and by parameters and static start (p + s, m), each
+    with the others held; ``process`` decay and process noise (1, n).
     """
 
     outputs: Step
@@ -86,7 +86,8 @@ class Buffers(NamedTuple):
 
     ``innovations`` (m,) and their ``slopes`` by parameters (p, m); their ``variances`` without white noise and the
     ``whitening`` matrix (m, m); their ``cross_covariances`` with the state, and ``whitened`` ones (m, n); what is taken
-    from the ``covariance`` (n, n) and added to the ``sensitivities`` (p, n). Of a step that moves states by c others:
+    from the ``covariance`` (n, n) and added to the ``sensitivities`` (p, n). ``through_statics`` is what outputs change
+    by parameters and constants through the static start (p + c, m). Of a step that moves states by c others:
     ``moved_rows`` (moving, n) of the covariance, their first columns (moving, c), and ``moved`` ones by both sides
     (moving, moving); first columns (p, c) of the sensitivities, and ``moved_sensitivities`` (p, moving).
     """
@@ -99,6 +100,7 @@ class Buffers(NamedTuple):
     whitened: Any
     covariance: Any
     sensitivities: Any
+    through_statics: Any
     moved_rows: Any
     moved_rows_from: Any
     moved: Any
@@ -106,11 +108,12 @@ class Buffers(NamedTuple):
     moved_sensitivities: Any
 
 
-def recursion_buffers(output_count: int, size: int, parameter_count: int, transition: Any) -> Buffers:
-    """Buffers for a number of outputs, states and parameters, and the transition of an integration."""
+def recursion_buffers(output_count: int, size: int, parameter_count: int, integration: Integration) -> Buffers:
+    """Buffers for a number of outputs, states and parameters, and an integration."""
     m, n, p = output_count, size, parameter_count
-    from_count, moving = transition.shape
+    from_count, moving = integration.transition.shape
     shapes: list[tuple[int, ...]] = [(m,), (p, m), (m, m), (m, m), (m, n), (m, n), (n, n), (p, n)]
+    shapes += [(len(integration.static_start.results[1]), m)]
     shapes += [(moving, n), (moving, from_count), (moving, moving), (p, from_count), (p, moving)]
     return Buffers(*(np.empty(shape) for shape in shapes))
 
@@ -124,11 +127,13 @@ def run_recursion(
     The first states move as the integration has it; behind those that are constant, the others only decay.
     """
     outputs, process = functions.outputs, functions.process
+    evaluate(integration.static_start, 0)
     for k in range(len(samples.measured)):
         assign(record.states[k], moments.state)
         if len(record.covariances):
             assign_matrix(record.covariances[k], moments.covariance)
         evaluate(outputs, k)
+        _add_slopes_of_statics(outputs.results, integration, buffers.through_statics)
         if len(record.output_matrices):
             assign_matrix(record.output_matrices[k], outputs.results[1].T)
         _update_by_measurements(outputs.results, moments, samples, record, buffers, k)
@@ -143,6 +148,17 @@ def run_recursion(
             moments.state[i] *= decay[i]
         assign(moments.state[: integration.moving.shape[1]], integration.moving[0])
     assign(record.states[len(samples.measured)], moments.state)
+
+
+@compiled
+def _add_slopes_of_statics(results: tuple[Any, ...], integration: Integration, through_statics: Any) -> None:
+    """Add what the outputs change by parameters and constants through the static start."""
+    slopes, moving, count = integration.static_start.results[1], integration.moving.shape[1], integration.constant_count
+    if len(slopes) > 0:
+        parameter_count = len(slopes) - count
+        multiply(slopes, results[2][parameter_count:], through_statics)
+        add_to_matrix(results[2][:parameter_count], 1.0, through_statics[:parameter_count])
+        add_to_matrix(results[1][moving : moving + count], 1.0, through_statics[parameter_count:])
 
 
 @compiled

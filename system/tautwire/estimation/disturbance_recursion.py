@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "72fa7ad189be74c87552d29b6b29601364f5b7b75aad4bc97c77e93649f31492"
+STEP_INTEGRATION_SHA256 = "ea93b8b956803d8a0a3ceddcc3dd3a0ffa87dbc13cbbc49f7cfdd7c95dcc286b"
 
 
 class DisturbanceStates(NamedTuple):

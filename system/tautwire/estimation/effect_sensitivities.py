@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import Effect
 
 from ..robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
-from ..robot.symbolic_model import FreeParameter, symbolic_model
+from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model, with_statics_as_parameters
 from ..robot.uncertain_parameters import uncertain_parameters
 from .filter_linearisation import LinearisedSegment
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis
@@ -101,17 +101,24 @@ class EffectSensitivities:
         cable_count: int,
     ) -> None:
         uncertain, reference = uncertain_parameters(extended_robot), extended_robot.platform.start_orientation
-        model = symbolic_model(extended_robot, [*free, *fixed], uncertain, reference)
+        complete = symbolic_model(extended_robot, [*free, *fixed], uncertain, reference)
+        static_start = _StaticStart.of(complete, len(uncertain), len(free))
+        model = with_statics_as_parameters(complete)
         shared_indices = [model.state_names.index(name) for name in state_names]
         effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
-        z, theta, p = model.states[effect_indices], model.parameters, model.parameters[: len(free)]
+        z, p = model.states[effect_indices], model.parameters[: len(free)]
+        theta = casadi.vertcat(model.parameters, SX(static_start.slopes.nz[:]))
         instant = SensorInstant.of(model)
-        state_sensitivities = SX.sym("slopes", _sensitivity_pattern(model.rates[effect_indices], z, p))
+        state_sensitivities = SX.sym("slopes", _sensitivity_pattern(complete.rates[effect_indices], z, p))
         outputs = delayed_outputs(model, cable_count, instant)
         arguments = [model.states[shared_indices], z, state_sensitivities, model.inputs, theta]
 
         def total_derivative(expression: SX) -> SX:
-            return casadi.jacobian(expression, p) + casadi.mtimes(casadi.jacobian(expression, z), state_sensitivities)
+            through_states = casadi.mtimes(casadi.jacobian(expression, z), state_sensitivities)
+            through_start = casadi.mtimes(
+                casadi.jacobian(expression, complete.static_start.symbols), static_start.slopes
+            )
+            return casadi.jacobian(expression, p) + through_states + through_start
 
         self._effect_state_count, self._parameter_count = len(effect_indices), len(free)
         self._forcing_function = CompiledFunction(
@@ -127,10 +134,11 @@ class EffectSensitivities:
             [casadi.densify(model.rates[effect_indices]), total_derivative(model.rates[effect_indices])],
         )
         self._step_function = CompiledFunction(_effect_state_step(rates, cable_count), carried=2)
-        start_sensitivities = casadi.jacobian(model.start[shared_indices], p)
-        self._start_function = Function(
-            "start", [theta], [casadi.densify(model.start[effect_indices]), casadi.densify(start_sensitivities)]
-        )
+        start_sensitivities = casadi.jacobian(complete.start[shared_indices], p)
+        starts = [casadi.densify(each) for each in (complete.start[effect_indices], start_sensitivities)]
+        self._start_function = Function("start", [complete.parameters], starts)
+        self._static_start_function = CompiledFunction(static_start.function)
+        self._constants = slice(len(shared_indices) - len(uncertain), len(shared_indices))
         self._input_count = model.inputs.numel()
 
     def restart(self) -> None:
@@ -165,23 +173,49 @@ class EffectSensitivities:
 
         The noise of what they predict has not touched those.
         """
-        theta, count = self._parameter_values(trial)[:, None], run.states.shape[1]
+        values, count = self._parameter_values(trial)[:, None], run.states.shape[1]
+        (static_start,) = self._static_start_function(count, values, run.states[self._constants])
+        theta = np.vstack([np.tile(values, count), static_start])
         effect_states, sensitivities = self._propagate_effect_states(run, theta, trial)
         derivatives = self._forcing_function(count, run.states, effect_states, sensitivities, inputs, theta, *instant)
         by_rates, by_outputs = (by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives)
         return by_rates, by_outputs
 
     def _propagate_effect_states(self, run: LinearisedSegment, theta: Array, trial: int) -> tuple[Array, Array]:
-        """The effect's states (z, K + 1) and their sensitivities (z, p x (K + 1))."""
+        """The effect's states (z, K + 1) and their sensitivities (z, p x (K + 1)).
+
+        What is constant in a step, theta, has been updated at its begin and is predicted for its end.
+        """
         count, parameter_count = len(run.step), self._parameter_count
         if not self._effect_state_count:
             return np.zeros((0, count + 1)), np.zeros((0, parameter_count * (count + 1)))
         interval_ends = (run.states[:, :-1], run.states[:, 1:], run.speeds[:, :-1], run.speeds[:, 1:])
         effect_states, sensitivities = self._step_function(
-            count, *self._effect_states_now[trial], *interval_ends, run.step[None, :], theta
+            count, *self._effect_states_now[trial], *interval_ends, run.step[None, :], theta[:, 1:]
         )
         self._effect_states_now[trial] = (effect_states[:, -1:], sensitivities[:, parameter_count * count :])
         return effect_states, sensitivities
+
+
+@dataclass(frozen=True)
+class _StaticStart:
+    """Static start: symbols of its derivatives ``slopes`` (s, p) by free parameters, and a ``function`` for all of it.
+
+    Of the parameters and the uncertain constants that gives the values (s,), then what of their derivatives is not
+    always zero, in one column.
+    """
+
+    slopes: SX
+    function: Function
+
+    @classmethod
+    def of(cls, model: SymbolicModel, constant_count: int, free_count: int) -> _StaticStart:
+        """Of a model whose last states are uncertain constants."""
+        constants = model.states[model.states.numel() - constant_count :]
+        by_parameters = model.static_start.jacobian(model.parameters[:free_count])
+        column = casadi.vertcat(model.static_start.values, SX(by_parameters.nz[:]))
+        function = Function("static_start", [model.parameters, constants], [casadi.densify(column)])
+        return cls(SX.sym("slopes_of_start", by_parameters.sparsity()), function)
 
 
 def _present_setting(robot: Robot, effect: Effect, cables: tuple[int, ...]) -> EffectSetting:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
 from .likelihood import Likelihood
-from .native_functions import by_sample
 
 Array = NDArray[np.float64]
 
@@ -92,12 +91,10 @@ def linearise_filter(
     With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows what was measured where the model does
     not.
     """
-    theta = likelihood.arguments(values)[:, None]
     size = likelihood.model.states.numel()
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
         _, observed, shift, speed, later, _, step, _, rotation = segment.columns
-        count = observed.shape[1]
         results, predicted = segment.results, segment.results.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], results.values, 0.0)
@@ -108,7 +105,7 @@ def linearise_filter(
         whitened_gain = cross_covariance @ inverse_factor.swapaxes(1, 2)
         corrections = (whitened_gain @ innovations[:, :, None])[:, :, 0]
         updated = likelihood.with_true_lengths(predicted + corrections.T)
-        rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
+        rate_jacobian = likelihood.rate_jacobians(values, updated, speed)
         yield LinearisedSegment(
             likelihood.with_true_lengths(results.states),
             np.hstack([speed, later[:, -1:]]),

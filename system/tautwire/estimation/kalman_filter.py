@@ -13,7 +13,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from ..recordings.speed_interpolation import bent_by
-from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
+from ..robot.symbolic_model import SymbolicModel, constants_as_parameters, with_statics_as_parameters
 from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_symbols import DisturbanceSymbols
 from .integration_steps import Substeps
@@ -71,20 +71,21 @@ class Noise:
 def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_sensitivities: bool = True) -> Function:
     """Outputs of a predicted state, of disturbance states behind the model's too, with their derivatives.
 
-    Arguments: state, parameters, shift, speed, next speed, time step, measured rotation. Results: x, y, z, tensions and
-    rotation from the measured one as shown ``shift`` (s) later (m,), and their derivatives by the state (m, n) and by
-    the parameters (m, p). Without sensitivities p is 0, whatever parameters the model has.
+    Arguments: state, parameters, static start, shift, speed, next speed, time step, measured rotation. Results: x, y,
+    z, tensions and rotation from the measured one as shown ``shift`` (s) later (m,), and their derivatives by the state
+    (m, n) and by the parameters and the static start (m, p + s), each with the others held. Without sensitivities the
+    last have no columns.
     """
-    disturbance = disturbance_symbols(model, noise)
+    disturbance, reduced = disturbance_symbols(model, noise), with_statics_as_parameters(model)
     state, instant_symbols = SX.sym("state", model.states.numel() + disturbance.count), SensorInstant.of(model)
     speed = SX.sym("speed", cable_count)
-    instant = [with_no_wrench(model, speed), model.parameters, *instant_symbols.symbols]
+    instant = [with_no_wrench(model, speed), reduced.parameters, *instant_symbols.symbols]
     model_state = disturbance.with_true_lengths(state, model.states.numel())
-    outputs = measurement_model(model, cable_count).call([model_state, *instant])
+    outputs = measurement_model(reduced, cable_count).call([model_state, *instant])
     expected, by_state, by_parameters = disturbance.added_to(outputs, state)
-    count = model.parameters.numel() if has_sensitivities else 0
+    count = by_parameters.shape[1] if has_sensitivities else 0
     later, step, shift, measured_rotation = instant_symbols.symbols
-    arguments = [state, model.parameters, shift, speed, later, step, measured_rotation]
+    arguments = [state, model.parameters, model.static_start.symbols, shift, speed, later, step, measured_rotation]
     return Function("outputs", arguments, [expected, by_state, by_parameters[:, :count]])
 
 
@@ -111,27 +112,31 @@ def process_function(model: SymbolicModel, cable_count: int, noise: Noise) -> Fu
     return Function("process", [step, drift, density, disturbance.arguments], [decay, process_noise])
 
 
-def preparation_function(
-    model: SymbolicModel, noise: Noise, constant_count: int = 0, has_sensitivities: bool = True
-) -> Function:
-    """What stays the same while a step is integrated: parameters, disturbance and constants, and the static start.
+def static_start_function(model: SymbolicModel, constant_count: int = 0, has_sensitivities: bool = True) -> Function:
+    """The static start, which stays the same while the uncertain constants do: from one update to the next.
 
-    Arguments: state, parameters, time step, disturbance. Results: the constants of :func:`trajectory_function` (q,);
-    the derivatives of the static start, which are the last s of them, by the others (s, q - s); and what the
-    disturbances that drive the model are multiplied by, for their means over the step (d,). Without sensitivities
-    there are no derivatives but those by the disturbances, on which the start does not depend: (0, d).
+    Arguments: parameters, uncertain constants (c,). Results: numbers of the static start (s,), and their derivatives by
+    the parameters and the constants (s, p + c); without sensitivities by neither (s, 0).
     """
-    disturbance = disturbance_symbols(model, noise)
-    state, step = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("step")
-    reduced = constants_as_parameters(disturbance.driven(model), constant_count)
-    moving = model.states.numel() - constant_count
-    driving = disturbance.mean_driving(state, step)
-    theta = casadi.vertcat(model.parameters, driving, state[moving : model.states.numel()])
-    statics, by_theta = _statics_at(reduced, theta)
-    if not has_sensitivities:
-        by_theta = SX(0, disturbance.driving_count)
-    results = [casadi.vertcat(theta, statics), by_theta, disturbance.mean_decay(step)]
-    return Function("preparation", [state, model.parameters, step, disturbance.arguments], results)
+    constants = model.states[model.states.numel() - constant_count :]
+    others = casadi.vertcat(model.parameters, constants) if has_sensitivities else SX(0, 1)
+    results = [model.static_start.values, model.static_start.jacobian(others)]
+    return Function("static_start", [model.parameters, constants], results)
+
+
+def preparation_function(model: SymbolicModel, noise: Noise, constant_count: int = 0) -> Function:
+    """What stays the same while a step is integrated: parameters, disturbance, constants, and the static start.
+
+    Arguments: state, parameters, static start, time step, disturbance. Results: the constants of
+    :func:`trajectory_function` (q,), and what the disturbances that drive the model are multiplied by, for their means
+    over the step (d,).
+    """
+    disturbance, statics = disturbance_symbols(model, noise), model.static_start.symbols
+    size = model.states.numel()
+    state, step = SX.sym("state", size + disturbance.count), SX.sym("step")
+    driving, constants = disturbance.mean_driving(state, step), state[size - constant_count : size]
+    results = [casadi.vertcat(model.parameters, driving, constants, statics), disturbance.mean_decay(step)]
+    return Function("preparation", [state, model.parameters, statics, step, disturbance.arguments], results)
 
 
 def trajectory_function(
@@ -143,7 +148,7 @@ def trajectory_function(
     and the number of the part, from 0. Result: the moving states at its end.
     """
     driven = disturbance_symbols(model, noise).driven(model)
-    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    reduced = with_statics_as_parameters(constants_as_parameters(driven, constant_count))
     interval, index = _Interval.of(cable_count), SX.sym("index")
     runge_kutta_step = _runge_kutta_step(reduced, cable_count)
     speeds = interval.speeds_in_part(index, substeps.state)
@@ -168,7 +173,7 @@ def slope_function(
     """
     disturbance = disturbance_symbols(model, noise)
     driven = disturbance.driven(model)
-    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    reduced = with_statics_as_parameters(constants_as_parameters(driven, constant_count))
     speed, later, index = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("index")
     middle = speed + (index + 0.5) / substeps.slope * (later - speed)
     own_count, varied = model.parameters.numel(), reduced.parameters
@@ -181,30 +186,30 @@ def slope_function(
 
 
 def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
-    """Jacobian of the rates of a model's states by these (n, n).
+    """Jacobians of the rates of a model's states by these (n, n) and by the static start (n, s).
 
-    Arguments: state, parameters, speed.
+    Arguments: state, parameters, static start, speed.
     """
     speed = SX.sym("speed", cable_count)
-    by_state = casadi.jacobian(model.rates, model.states)
-    (by_state,) = casadi.substitute([by_state], [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
-    return Function("rate_jacobian", [model.states, model.parameters, speed], [by_state])
+    statics = model.static_start.symbols
+    jacobians = [casadi.jacobian(model.rates_by_statics, each) for each in (model.states, statics)]
+    jacobians = casadi.substitute(jacobians, [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
+    return Function("rate_jacobian", [model.states, model.parameters, statics, speed], jacobians)
 
 
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
     """Step of a simulation without noise: the state moves as in :func:`trajectory_function`.
 
-    Arguments: state, parameters, speed, next speed, bends, time step. Results: state at the next sample (n,), and
-    x, y, z, the tensions and the rotation vector of this one without delay (m,).
+    Arguments: state, parameters, static start, speed, next speed, bends, time step. Results: state at the next sample
+    (n,), and x, y, z, the tensions and the rotation vector of this one without delay (m,).
     """
-    interval = _Interval.of(cable_count)
-    extended, theta = _with_statics_as_parameters(model), casadi.vertcat(model.parameters, model.static_values)
-    next_state = _moved(extended, theta, interval, substeps.state)
+    interval, reduced, indices = _Interval.of(cable_count), with_statics_as_parameters(model), model.indices
+    next_state = _moved(reduced, interval, substeps.state)
     at_sample = casadi.densify(with_no_wrench(model, interval.speed))
-    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [at_sample])
-    indices = model.indices
+    (outputs,) = casadi.substitute([reduced.outputs], [model.inputs], [at_sample])
     shown = casadi.vertcat(outputs[:3], outputs[indices.tensions], outputs[indices.pose][3:])
-    return Function("simulation", [model.states, model.parameters, *interval.symbols], [next_state, shown])
+    arguments = [model.states, model.parameters, model.static_start.symbols, *interval.symbols]
+    return Function("simulation", arguments, [next_state, shown])
 
 
 def disturbance_symbols(model: SymbolicModel, noise: Noise) -> DisturbanceSymbols:
@@ -249,27 +254,12 @@ class _Interval:
         return [line + bent_by((index + share) / count, *bends) for share, line in lines]
 
 
-def _statics_at(model: SymbolicModel, theta: SX) -> tuple[SX, SX]:
-    """Numbers of the static start that depend on parameters with the values ``theta``, and their derivatives."""
-    by_theta = casadi.jacobian(model.static_values, model.parameters)
-    statics = Function("statics", [model.parameters], [model.static_values, by_theta])
-    values, slopes = statics(theta)
-    return values, slopes
-
-
-def _with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
-    """The model with its static start as further parameters, for rates that are evaluated many times in a sample."""
-    return replace(
-        model, rates=model.rates_by_statics, parameters=casadi.vertcat(model.parameters, model.static_symbols)
-    )
-
-
-def _moved(model: SymbolicModel, theta: SX, interval: _Interval, part_count: int) -> SX:
+def _moved(model: SymbolicModel, interval: _Interval, part_count: int) -> SX:
     """The states at the end of an interval that is integrated in equal parts."""
     runge_kutta_step, states = _runge_kutta_step(model, interval.speed.numel()), model.states
     for index in range(part_count):
         speeds = interval.speeds_in_part(index, part_count)
-        states = runge_kutta_step(states, theta, *speeds, interval.step / part_count)
+        states = runge_kutta_step(states, model.parameters, *speeds, interval.step / part_count)
     return states
 
 

@@ -32,7 +32,7 @@ from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBAN
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
 from .measurement_model import output_count, rotation_count
-from .native_functions import CompiledFunction
+from .native_functions import by_sample
 
 Array = NDArray[np.float64]
 
@@ -112,15 +112,16 @@ class Likelihood:
         """Instructions of the filter, in proportion to which this takes memory."""
         return self._filter_functions.instruction_count
 
-    @property
-    def outputs(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.output_function`."""
-        return self._filter_functions.outputs
-
-    @property
-    def rate_jacobian(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
-        return self._filter_functions.rate_jacobian
+    def rate_jacobians(self, parameters: Sequence[float] | Array, states: Array, speed: Array) -> Array:
+        """Jacobians of the rates by the states (K, n, n), at states (n, K) that winch speeds (cables, K) move."""
+        functions, theta, count = self._filter_functions, self.arguments(parameters)[:, None], states.shape[1]
+        first = len(states) - len(self.uncertain)
+        statics, slopes = functions.static_start(count, theta, states[first:])
+        jacobians = functions.rate_jacobian(count, states, theta, statics, speed)
+        by_state, by_statics = (by_sample(each, count) for each in jacobians)
+        # Uncertain constants have no rates.
+        by_state[:, :first, first:] += by_statics[:, :first] @ by_sample(slopes, count)[:, :, len(theta) :]
+        return by_state
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
@@ -176,8 +177,9 @@ class Likelihood:
         nothing = np.zeros((recording.sample_count, output_count(self.model)))
         columns, is_recorded = filter_columns(recording, nothing, nothing)
         theta, interval = self.arguments(parameters), columns[3:7]
-        start, _ = self._filter_functions.start(theta)
-        _, outputs = self._filter_functions.simulation(len(is_recorded), np.array(start), theta[:, None], *interval)
+        start, _ = (np.array(part) for part in self._filter_functions.start(theta))
+        statics, _ = self._filter_functions.static_start(1, theta[:, None], start[len(start) - len(self.uncertain) :])
+        _, outputs = self._filter_functions.simulation(len(is_recorded), start, theta[:, None], statics, *interval)
         lags = np.array(self._filter_functions.lags(theta)).ravel()
         time, shown = recording.time, outputs[:, is_recorded]
         rows = np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T

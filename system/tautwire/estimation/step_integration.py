@@ -107,22 +107,24 @@ class IntegrationBuffers(NamedTuple):
 class Integration(NamedTuple):
     """Functions that a step is integrated by, what they read, and what comes out.
 
-    ``preparation`` gives the constants (1, q) of the others: parameters, driving disturbances, uncertain constants, and
-    the static start, with the derivatives of the latter by the former (q - s, s), and factors (1, d) of the former's
-    driving disturbances. ``part`` takes ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope``
-    gives the Jacobians of the rates at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n). Without
-    sensitivities derivatives are by driving disturbances alone, (d, 0) and (d, n), and c and p are 0.
-    ``steps`` (K,) are in s. Results: ``moving``, and derivatives of it by the states before, uncertain constants and
-    driving disturbances, ``transition`` (n + c + d, n), and by parameters, ``direct`` (p, n).
+    ``static_start`` gives numbers (1, s) that follow from parameters and ``constant_count`` c uncertain constants, with
+    their derivatives by these (p + c, s). ``preparation`` gives the constants (1, q) of the others: parameters, driving
+    disturbances, uncertain constants, and the static start, and factors (1, d) of the driving disturbances. ``part``
+    takes ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope`` gives the Jacobians of the rates
+    at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n). Without sensitivities derivatives are by
+    driving disturbances alone, (0, s) and (d, n), and c and p are 0. ``steps`` (K,) are in s. Results: ``moving``, and
+    derivatives of it by the states before, uncertain constants and driving disturbances, ``transition`` (n + c + d, n),
+    and by parameters, ``direct`` (p, n).
     """
 
+    static_start: Step
+    constant_count: int
     preparation: Step
     part: Step
     slope: Step
     division: Division
     moving: Any
     middle: Any
-    constants: Any
     index: Any
     steps: Any
     transition: Any
@@ -175,9 +177,13 @@ def evaluate(step: Step, k: int) -> None:
 
 @compiled
 def integrate_step(integration: Integration, state: Any, k: int) -> None:
-    """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones."""
+    """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones.
+
+    The static start is that of this state from then on, until its uncertain constants are updated.
+    """
+    if integration.constant_count > 0:
+        evaluate(integration.static_start, k)
     evaluate(integration.preparation, k)
-    assign_matrix(integration.constants, integration.preparation.results[0])
     _move(integration, state, k)
     _differentiate(integration, k)
     _fill_in(integration)
@@ -245,16 +251,17 @@ def _integrate_exponential(jacobian: Any, part: float, division: Division, buffe
 @compiled
 def _fill_in(integration: Integration) -> None:
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
-    by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
+    slopes, factors = integration.static_start.results[1], integration.preparation.results[1][0]
     by_state, by_constants = integration.buffers.by_state, integration.buffers.by_constants
-    theta_count, size, driving = len(by_theta), len(by_state), len(factors)
-    if by_theta.shape[1] > 0:
-        rows = integration.buffers.rows[:theta_count]
-        multiply(by_theta, by_constants[theta_count:], rows)
-        add_to_matrix(by_constants[:theta_count], 1.0, rows)
-    result = integration.transition
-    constant_count = len(result) - size - driving
-    first_constant = theta_count - constant_count
+    size, driving, constant_count = len(by_state), len(factors), integration.constant_count
+    theta_count = len(by_constants)
+    if len(slopes) > 0:
+        theta_count -= slopes.shape[1]
+        rows, parameter_count = integration.buffers.rows[: len(slopes)], len(slopes) - constant_count
+        multiply(slopes, by_constants[theta_count:], rows)
+        add_to_matrix(by_constants[:parameter_count], 1.0, rows[:parameter_count])
+        add_to_matrix(by_constants[theta_count - constant_count : theta_count], 1.0, rows[parameter_count:])
+    result, first_constant = integration.transition, theta_count - constant_count
     assign_matrix(result[:size], by_state)
     assign_matrix(result[size : size + constant_count], by_constants[first_constant:theta_count])
     for i in range(driving):

@@ -20,7 +20,7 @@ from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import EffectSetting, Robot
 from .static_equilibrium import start_orientation
 from .symbolic_equations import CASADI_MATHEMATICS, Equations, MechanicalVariables, minimal_equations
-from .symbolic_statics import HeldStatics, held_statics, symbolic_statics
+from .symbolic_statics import ImplicitRoot, StaticStart, at_roots, held_statics, symbolic_statics
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 # Instead of an effect's index: a parameter of the formulas.
@@ -48,8 +48,8 @@ class SymbolicModel:
     ``sensor_delays`` (m) of positions, tensions and rotations in s; ``span_tensions`` (n) of the free spans in N.
     ``start`` is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium;
     ``parameters`` are the free ones. ``reference_orientation`` is the one from which rotations of a rigid body count.
-    ``rates_by_statics`` are the rates with those numbers of the static start that depend on parameters or uncertain
-    states as symbols of their own, ``static_symbols``; ``static_values`` are these, the same all through a sample.
+    ``rates_by_statics`` and ``outputs_by_statics`` have those numbers of the static start that depend on parameters or
+    uncertain states as symbols of their own, see ``static_start``.
     """
 
     states: SX
@@ -67,8 +67,8 @@ class SymbolicModel:
     indices: StateIndices
     reference_orientation: Quaternion
     rates_by_statics: SX
-    static_symbols: SX
-    static_values: SX
+    outputs_by_statics: SX
+    static_start: StaticStart
 
 
 def symbolic_model(
@@ -96,20 +96,23 @@ def symbolic_model(
     count = len(assembly.cables)
     axes = platform_axes(robot.platform) if robot.platform.is_rigid_body else None
     platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference, axes)
-    held = held_statics(assembly.cables, _length_shifts(assembly, constants), [*symbols, *constants])
+    declared = _DeclaredStart.of(statics.roots, constants)
+    shifts = _length_shifts(assembly, declared)
+    held = held_statics(assembly.cables, shifts, [*symbols, *constants], (*statics.roots, *declared.roots))
     lengths, winch_speeds = SX.sym("unstrained_length", count), SX.sym("winch_speed", count)
     variables = MechanicalVariables(platform, lengths, winch_speeds, held.length_shifts)
     effect_states, equations = minimal_equations(replace(assembly, cables=held.cables), variables)
-    rates_by_statics, equations = equations.rates, _with_static_values(equations, held)
-    start = _nominal_start(_initial_state(assembly, statics.rotation, len(effect_states)), constants)
+    by_statics, equations = equations, _with_static_values(equations, held.start)
+    start = declared.values(_initial_state(assembly, statics.rotation, len(effect_states)))
     no_rates, indices = SX(len(constants), 1), StateIndices(platform.pose.numel(), count)
     first_effect_state = variables.states.numel()
+    errors = sensor_errors(uncertain_parameters, perturbations, count)
     return SymbolicModel(
         states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *constants),
         inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
         rates=casadi.vertcat(equations.rates, no_rates),
-        outputs=_shown(equations.outputs, indices, sensor_errors(uncertain_parameters, perturbations, count)),
+        outputs=_shown(equations.outputs, indices, errors),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly, platform.pose.numel() - 3),
         start=casadi.vertcat(start, no_rates),
@@ -123,18 +126,45 @@ def symbolic_model(
         output_names=variables.output_names,
         indices=indices,
         reference_orientation=reference,
-        rates_by_statics=casadi.vertcat(rates_by_statics, no_rates),
-        static_symbols=held.symbols,
-        static_values=held.values,
+        rates_by_statics=casadi.vertcat(by_statics.rates, no_rates),
+        outputs_by_statics=_shown(by_statics.outputs, indices, errors),
+        static_start=held.start,
     )
 
 
-def _with_static_values(equations: Equations, held: HeldStatics) -> Equations:
+@dataclass(frozen=True)
+class _DeclaredStart:
+    """The static start at the declared values of uncertain parameters: these, and its roots in place of others."""
+
+    constants: SX
+    replaced_roots: tuple[ImplicitRoot, ...]
+    roots: tuple[ImplicitRoot, ...]
+
+    @classmethod
+    def of(cls, roots: tuple[ImplicitRoot, ...], constants: Sequence[SX]) -> _DeclaredStart:
+        column = casadi.vertcat(SX(0, 1), *constants)
+        there = tuple(root.at(column, SX.zeros(column.shape)) for root in roots) if constants else ()
+        return cls(column, roots, there)
+
+    def expression(self, expression: SX) -> SX:
+        """An expression at the declared values."""
+        if not self.constants.numel():
+            return expression
+        symbols = [self.constants, *(root.unknowns for root in self.replaced_roots)]
+        values = [SX.zeros(self.constants.shape), *(root.unknowns for root in self.roots)]
+        return casadi.substitute([expression], symbols, values)[0]
+
+    def values(self, expression: SX) -> SX:
+        """The same by free parameters alone."""
+        return at_roots([self.expression(expression)], self.roots or self.replaced_roots)[0]
+
+
+def _with_static_values(equations: Equations, start: StaticStart) -> Equations:
     """The equations as functions of states, inputs and parameters alone."""
-    if not held.symbols.numel():
+    if not start.symbols.numel():
         return equations
     expressions = [equations.rates, equations.outputs, equations.span_tensions]
-    return Equations(*casadi.substitute(expressions, [held.symbols], [held.values]))
+    return Equations(*casadi.substitute(expressions, [start.symbols], [start.values]))
 
 
 def _shown(outputs: SX, indices: StateIndices, errors: SensorErrors) -> SX:
@@ -154,17 +184,13 @@ def _initial_state(assembly: RobotAssembly, rotation: SX, effect_state_count: in
     return casadi.vertcat(motion, *lengths, SX(effect_state_count, 1))
 
 
-def _length_shifts(assembly: RobotAssembly, constants: Sequence[SX]) -> SX:
+def _length_shifts(assembly: RobotAssembly, declared: _DeclaredStart) -> SX:
     """How much longer the cables are at the start (n,) than at the declared values of the uncertain parameters."""
     lengths = casadi.vertcat(*(SX(component.constants.start_length) for component in assembly.cables))
-    if not constants or not casadi.depends_on(lengths, casadi.vertcat(*constants)):
+    uncertain = casadi.vertcat(declared.constants, *(root.unknowns for root in declared.replaced_roots))
+    if not declared.constants.numel() or not casadi.depends_on(lengths, uncertain):
         return SX(lengths.shape[0], 1)
-    return lengths - _nominal_start(lengths, constants)
-
-
-def _nominal_start(start: SX, constants: Sequence[SX]) -> SX:
-    """The initial state at the declared values, independent of the uncertain parameters."""
-    return casadi.substitute(start, casadi.vertcat(*constants), SX.zeros(len(constants), 1)) if constants else start
+    return lengths - declared.expression(lengths)
 
 
 def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
@@ -181,6 +207,16 @@ def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
     )
 
 
+def with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
+    """The model with its static start as further parameters, for what is evaluated many times while that stays."""
+    return replace(
+        model,
+        rates=model.rates_by_statics,
+        outputs=model.outputs_by_statics,
+        parameters=casadi.vertcat(model.parameters, model.static_start.symbols),
+    )
+
+
 def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
@@ -188,15 +224,16 @@ def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     settling_indices = [index for index in range(model.states.numel()) if index not in model.drifting]
     frozen_states = model.states[list(model.drifting)]
     expressions = [model.rates[settling_indices], model.outputs, model.span_tensions]
-    expressions.append(model.rates_by_statics[settling_indices])
-    rates, outputs, tensions, by_statics = casadi.substitute(
+    expressions += [model.rates_by_statics[settling_indices], model.outputs_by_statics]
+    rates, outputs, tensions, *by_statics = casadi.substitute(
         expressions, [frozen_states], [SX.zeros(*frozen_states.shape)]
     )
     return replace(
         model,
         states=model.states[settling_indices],
         rates=rates,
-        rates_by_statics=by_statics,
+        rates_by_statics=by_statics[0],
+        outputs_by_statics=by_statics[1],
         outputs=outputs,
         span_tensions=tensions,
         start=model.start[settling_indices],

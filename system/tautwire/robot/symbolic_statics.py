@@ -33,22 +33,92 @@ LIMIT_TOLERANCE = 1e-6
 WEIGHT_ITERATIONS = 6
 # Fewer cables leave an orientation to its equilibrium.
 FREEDOMS = 6
-NEWTON_STEPS = 8
+NEWTON_STEPS = 16
 RANK_TOLERANCE = 1e-9
 # rad: of a root that is the nearest, what multipliers leave of its rotation.
 STATIONARITY_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
+class ImplicitRoot:
+    """Root of equations with symbolic parameters: its ``unknowns`` (k,), and their ``values`` by the parameters.
+
+    Of ``equations`` F (m,) and a constant ``inverse`` M (k, m) of their Jacobian it is the limit of ``z <- z - M F``.
+    """
+
+    unknowns: SX
+    values: SX
+    equations: SX
+    inverse: Array
+    projector: Array
+
+    def jacobian(self, symbols: SX) -> SX:
+        """Derivatives of the unknowns by parameters (k, p), in which the unknowns are symbols.
+
+        By the implicit function theorem, with the projector P on what M reaches,
+
+            (M F_z + 1 - P) dz/dp = -M F_p
+
+        A small part of the operations that derivatives of each iteration take.
+        """
+        by_unknowns, by_symbols = (casadi.jacobian(self.equations, each) for each in (self.unknowns, symbols))
+        near_identity = casadi.mtimes(SX(self.inverse), by_unknowns) + SX(np.eye(len(self.projector)) - self.projector)
+        return -casadi.solve(near_identity, casadi.mtimes(SX(self.inverse), by_symbols))
+
+    def at(self, symbols: SX, values: SX) -> ImplicitRoot:
+        """The root where some parameters have other values, with unknowns of its own."""
+        unknowns = SX.sym("unknowns_there", self.unknowns.numel())
+        (root,) = casadi.substitute([self.values], [symbols], [values])
+        (equations,) = casadi.substitute([self.equations], [self.unknowns, symbols], [unknowns, values])
+        return replace(self, unknowns=unknowns, values=root, equations=equations)
+
+
+@dataclass(frozen=True)
 class SymbolicStatics:
     """The static start: ``tensions`` (n,) in N, and ``rotation`` (3,) in rad from a reference, empty of a point mass.
 
-    ``orientation`` is that of the platform there, a unit quaternion.
+    ``orientation`` is that of the platform there, a unit quaternion. Where these follow from no formula they depend on
+    the unknowns of the ``roots``.
     """
 
     tensions: list[SX]
     rotation: SX
     orientation: Quaternion
+    roots: tuple[ImplicitRoot, ...] = ()
+
+
+@dataclass(frozen=True)
+class StaticStart:
+    """Numbers of the static start that depend on parameters: ``symbols`` for them (s,), and their ``expressions``.
+
+    The latter have parameters and the unknowns of the ``roots`` as symbols.
+    """
+
+    symbols: SX
+    expressions: SX
+    roots: tuple[ImplicitRoot, ...]
+
+    @property
+    def values(self) -> SX:
+        """The numbers by the parameters alone (s,)."""
+        return at_roots([self.expressions], self.roots)[0]
+
+    def jacobian(self, symbols: SX) -> SX:
+        """Derivatives of the numbers by parameters (s, p)."""
+        result = casadi.jacobian(self.expressions, symbols)
+        for root in self.roots:
+            by_unknowns = casadi.jacobian(self.expressions, root.unknowns)
+            result += casadi.mtimes(by_unknowns, root.jacobian(symbols))
+        return at_roots([result], self.roots)[0]
+
+
+def at_roots(expressions: Sequence[SX], roots: Sequence[ImplicitRoot]) -> list[SX]:
+    """Expressions with the values of unknowns in their place."""
+    if not roots:
+        return list(expressions)
+    unknowns, values = ([getattr(root, name) for root in roots] for name in ("unknowns", "values"))
+    substituted: list[SX] = casadi.substitute(list(expressions), unknowns, values)
+    return substituted
 
 
 def symbolic_statics(
@@ -96,11 +166,13 @@ def _equilibrium_on_few_cables(
         for each in (symbolic_robot, nominal)
     )
     root = _continued_root(unknowns, lacking, of_numbers, start)
-    orientation: Quaternion = multiply(quaternion_of(mathematics, (root[0], root[1], root[2])), declared)
+    x, y, z, *shares = casadi.vertsplit(root.unknowns[: len(start)])
+    orientation: Quaternion = multiply(quaternion_of(mathematics, (x, y, z)), declared)
     if nominal.initial_state is not None and nominal.initial_state.orientation is not None:
         orientation = nominal.initial_state.orientation
     rotation = _rotation_from(reference, orientation, mathematics)
-    return SymbolicStatics(casadi.vertsplit(load * root[3:]), casadi.vertcat(*map(SX, rotation)), orientation)
+    tensions_there = [load * share for share in shares]
+    return SymbolicStatics(tensions_there, casadi.vertcat(*map(SX, rotation)), orientation, (root,))
 
 
 def _imbalance(nominal: Robot, robot: Robot, rotation: SX, tensions: SX, mathematics: Mathematics) -> SX:
@@ -114,8 +186,11 @@ def _imbalance(nominal: Robot, robot: Robot, rotation: SX, tensions: SX, mathema
     return pulls + casadi.sum2(_wrenches(arms, weights)) - _load_wrench(nominal, robot, orientation, mathematics)
 
 
-def _continued_root(unknowns: SX, lacking: SX, of_numbers: SX, start: Array) -> SX:
-    """The unknowns at which the balance lacks nothing and the rotation is smallest, from the root for the numbers."""
+def _continued_root(unknowns: SX, lacking: SX, of_numbers: SX, start: Array) -> ImplicitRoot:
+    """The unknowns at which the balance lacks nothing and the rotation is smallest, from the root for the numbers.
+
+    Multipliers follow them, if the rotation is the smallest by these.
+    """
     multipliers = SX.sym("multipliers", lacking.numel())
     jacobian = np.array(casadi.Function("jacobian", [unknowns], [casadi.jacobian(of_numbers, unknowns)])(start))
     rotation = np.append(start[:3], np.zeros(len(start) - 3))
@@ -125,15 +200,14 @@ def _continued_root(unknowns: SX, lacking: SX, of_numbers: SX, start: Array) -> 
     if np.linalg.norm(jacobian.T @ at_root + rotation) <= STATIONARITY_TOLERANCE and len(start) > FREEDOMS - 1:
         variables, point = casadi.vertcat(unknowns, multipliers), np.concatenate([start, at_root])
         equations, numbers = (_stationarity(unknowns, multipliers, each) for each in (lacking, of_numbers))
-    inverse = np.linalg.pinv(
-        np.array(casadi.Function("slope", [variables], [casadi.jacobian(numbers, variables)])(point)), RANK_TOLERANCE
-    )
+    slopes = np.array(casadi.Function("slope", [variables], [casadi.jacobian(numbers, variables)])(point))
+    inverse = np.asarray(np.linalg.pinv(slopes, RANK_TOLERANCE), dtype=float)
     residual = np.array(casadi.Function("residual", [variables], [numbers])(point)).ravel()
-    root = SX(point)
+    equations, root = equations - residual, SX(point)
     for _ in range(NEWTON_STEPS):
-        (left,) = casadi.substitute([equations], [variables], [root])
-        root = root - casadi.mtimes(SX(inverse), left - residual)
-    return root[: unknowns.numel()]
+        (lack,) = casadi.substitute([equations], [variables], [root])
+        root = root - casadi.mtimes(SX(inverse), lack)
+    return ImplicitRoot(variables, root, equations, inverse, inverse @ slopes)
 
 
 def _stationarity(unknowns: SX, multipliers: SX, lacking: SX) -> SX:
@@ -145,21 +219,22 @@ def _stationarity(unknowns: SX, multipliers: SX, lacking: SX) -> SX:
 
 @dataclass(frozen=True)
 class HeldStatics:
-    """Cables whose static start, and whose length shifts (n,), are symbols where they depend on others; their values.
+    """Cables whose static start, and whose length shifts (n,), are symbols where they depend on others.
 
     The start is the same all through a sample, and is not to be computed again with each of the rates.
     """
 
     cables: tuple[CableComponent, ...]
     length_shifts: SX
-    symbols: SX
-    values: SX
+    start: StaticStart
 
 
-def held_statics(cables: Sequence[CableComponent], length_shifts: SX, others: Sequence[SX]) -> HeldStatics:
-    """Holds what depends on ``others``; numbers stay numbers."""
+def held_statics(
+    cables: Sequence[CableComponent], length_shifts: SX, others: Sequence[SX], roots: tuple[ImplicitRoot, ...]
+) -> HeldStatics:
+    """Holds what depends on ``others`` or on roots; numbers stay numbers."""
     held: list[tuple[SX, SX]] = []
-    symbols = casadi.vertcat(*others) if others else SX(0, 1)
+    symbols = casadi.vertcat(SX(0, 1), *others, *(root.unknowns for root in roots))
 
     def hold(name: str, value: Any) -> SX:
         expression = SX(value)
@@ -180,10 +255,8 @@ def held_statics(cables: Sequence[CableComponent], length_shifts: SX, others: Se
         )
         components.append(replace(component, constants=held_constants))
     shifts = casadi.vertcat(*(hold("length_shift", shift) for shift in casadi.vertsplit(length_shifts)))
-    held_symbols, values = ([pair[k] for pair in held] for k in (0, 1))
-    if not held:
-        return HeldStatics(tuple(components), shifts, SX(0, 1), SX(0, 1))
-    return HeldStatics(tuple(components), shifts, casadi.vertcat(*held_symbols), casadi.vertcat(*values))
+    held_symbols, expressions = (casadi.vertcat(SX(0, 1), *(pair[k] for pair in held)) for k in (0, 1))
+    return HeldStatics(tuple(components), shifts, StaticStart(held_symbols, expressions, roots))
 
 
 def _start_tensions(
