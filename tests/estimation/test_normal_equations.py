@@ -1,5 +1,6 @@
 """A few rows in the place of all: the same cost, gradient and curvature."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from tautwire.estimation.estimation_data import DataSet
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.normal_equations import compressed_residuals
+from tautwire.estimation.normal_equations import LeastSquares, compressed_residuals
 from tautwire.robot.schema import EffectSetting
 from tautwire.robot.symbolic_model import FreeParameter
 from tests.support.recordings import recorded
@@ -47,3 +48,52 @@ def test_what_is_not_finite_stays_so() -> None:
     wild = np.array([9e8, np.nan, 0.05])
     residuals, _ = compressed_residuals(likelihood(), wild, DataSet(RECORDING, (0.0, 0.0, 0.0), ROWS), 0.0)
     assert np.isnan(residuals).all()
+
+
+def parabola(biased_by: float) -> tuple[Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], list[float]]:
+    """Residuals that are least at two, their slope off as if at another place; and the places where they are taken."""
+    visited: list[float] = []
+
+    def evaluate(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        visited.append(float(point[0]))
+        miss = 100.0 * (float(point[0]) - 2.0)
+        bias = 100.0 * biased_by
+        # Gradient of half the sum of squares about a place that is off, by a slope that is exact elsewhere.
+        others = np.sqrt(1e4 + miss**2 - (miss + bias) ** 2) if bias else 100.0
+        return np.array([miss + bias, others]), np.array([[100.0], [0.0]])
+
+    return evaluate, visited
+
+
+def test_least_squares_with_exact_slopes_arrive_at_the_minimum() -> None:
+    evaluate, visited = parabola(0.0)
+    squares = LeastSquares(evaluate, np.array([1.0]), 1e-8, 30)
+    assert squares.minimise((np.array([-np.inf]), np.array([np.inf]))) == pytest.approx(2.0, abs=1e-9)
+    assert squares.cost == pytest.approx(0.5e4)
+    assert len(visited) < 6
+
+
+def test_least_squares_end_where_slopes_that_are_not_exact_lead_up() -> None:
+    """Steps lead on past the minimum, where the slopes would have it, and each of them is rejected."""
+    evaluate, visited = parabola(-0.02)
+    squares = LeastSquares(evaluate, np.array([2.001]), 1e-4, 30)
+    best = squares.minimise((np.array([-np.inf]), np.array([np.inf])))
+    assert best == pytest.approx(2.001)
+    assert squares.cost == pytest.approx(0.5e4, rel=1e-5)
+    assert len(visited) < 8
+
+
+def test_least_squares_go_on_where_a_step_was_merely_too_long() -> None:
+    """The first steps from afar overshoot, and are rejected too."""
+
+    def evaluate(point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        angle = np.arctan(3.0 * point)
+        return 100.0 * angle, np.diag(300.0 / (1.0 + 9.0 * point**2))
+
+    squares = LeastSquares(evaluate, np.array([1.2]), 1e-4, 30)
+    assert squares.minimise((np.array([-np.inf]), np.array([np.inf]))) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_start_without_finite_residuals_is_told() -> None:
+    squares = LeastSquares(lambda point: (np.full(2, np.nan), np.zeros((2, 1))), np.array([1.0]), 1e-4, 30)
+    assert not squares.has_finite_start

@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
@@ -21,7 +20,7 @@ from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .innovations import Innovations
 from .kalman_filter import Noise
 from .likelihood import Likelihood
-from .normal_equations import compressed_residuals
+from .normal_equations import LeastSquares, compressed_residuals
 from .policy import DEFAULT_POLICY, FitPolicy
 
 Array = NDArray[np.float64]
@@ -140,19 +139,11 @@ class Fitter:
                 scaled = max((scaled, scaled_start), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
             residual.origin = scaled - 1.0
-            if not np.all(np.isfinite(residual.residuals(np.ones(len(free))))):
+            squares = LeastSquares(residual.evaluate, np.ones(len(free)), stage_tolerance, self.policy.max_evaluations)
+            if not squares.has_finite_start:
                 raise NoFitError(scaled * scale)
-            solution = least_squares(
-                residual.residuals,
-                np.ones(len(free)),
-                jac=residual.jacobian,
-                bounds=(lower - residual.origin, upper - residual.origin),
-                x_scale="jac",
-                ftol=stage_tolerance,
-                max_nfev=self.policy.max_evaluations,
-            )
-            scaled = residual.origin + solution.x
-        return _scaled_back(robot, free, scaled, np.asarray(solution.jac, dtype=float))
+            scaled = residual.origin + squares.minimise((lower - residual.origin, upper - residual.origin))
+        return _scaled_back(robot, free, scaled, squares.jacobian)
 
     def _first_near(
         self, starts: Sequence[Robot], chosen: Collection[Hypothesis], data: DataSet, min_log_likelihood: float
@@ -245,7 +236,7 @@ def _parameter_declarations(robot: Robot, free: Sequence[FreeParameter]) -> list
 
 
 class _Residual:
-    """Compressed innovations and their Jacobian in scaled parameters, cached at the last point."""
+    """Compressed innovations and their Jacobian in scaled parameters, counted from an origin."""
 
     def __init__(
         self,
@@ -261,8 +252,6 @@ class _Residual:
         self.scale = scale
         self.acceleration_noise_density = acceleration_noise_density
         self.origin = np.zeros(len(scale))
-        self._evaluated_at: Array | None = None
-        self._cached: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
     def log_likelihood(self, scaled: Array) -> float:
         innovations = self.likelihood.innovations(
@@ -271,21 +260,13 @@ class _Residual:
         value = innovations.log_likelihood(self.sample.rows)
         return value if np.isfinite(value) else -np.inf
 
-    def residuals(self, offset: Array) -> Array:
-        return self._evaluate(self.origin + offset)[0]
-
-    def jacobian(self, offset: Array) -> Array:
-        return self._evaluate(self.origin + offset)[1]
-
-    def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
-        if self._evaluated_at is None or not np.array_equal(self._evaluated_at, scaled):
-            self.poll_interrupts()
-            residuals, sensitivities = compressed_residuals(
-                self.likelihood, scaled * self.scale, self.sample, self.acceleration_noise_density
-            )
-            self._cached = (residuals, sensitivities * self.scale)
-            self._evaluated_at = scaled.copy()
-        return self._cached
+    def evaluate(self, offset: Array) -> tuple[Array, Array]:
+        """Residuals and their slopes at an offset from the origin."""
+        self.poll_interrupts()
+        residuals, sensitivities = compressed_residuals(
+            self.likelihood, (self.origin + offset) * self.scale, self.sample, self.acceleration_noise_density
+        )
+        return residuals, sensitivities * self.scale
 
 
 def _fitter_in_worker(noise: Noise, policy: FitPolicy) -> Fitter:

@@ -19,13 +19,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 
 from ..errors import TautwireError
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .likelihood import Likelihood
-from .normal_equations import compressed_residuals
+from .normal_equations import LeastSquares, compressed_residuals
 from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds, parameter_scales
 from .policy import DEFAULT_POLICY, ProfileLikelihoodPolicy
 from .worker_pool import WorkerPool
@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 NON_FINITE_RISE = 1e4
 # Least distance of starts from bounds, in deviations.
 MIN_BOUND_DISTANCE = 1e-6
+COST_TOLERANCE = 1e-6
 CHI_SQUARED_95 = NORMAL_QUANTILE_95**2
 
 
@@ -106,19 +107,16 @@ class ProfileLikelihood:
         low, high = (self._lower[others] - origin) / units, (self._upper[others] - origin) / units
         start = np.clip(np.zeros(len(origin)), np.minimum(low + MIN_BOUND_DISTANCE, 0.5 * (low + high)), high)
         start = np.clip(start, low, np.maximum(high - MIN_BOUND_DISTANCE, 0.5 * (low + high)))
-        residual = _ConstrainedResidual(self._residuals, index, value, origin, units)
-        if not np.all(np.isfinite(residual.residuals(start))):
+
+        def evaluate(offset: Array) -> tuple[Array, Array]:
+            residuals, jacobian = self._residuals(np.insert(origin + offset * units, index, value))
+            return residuals, np.delete(jacobian, index, axis=1) * units
+
+        squares = LeastSquares(evaluate, start, COST_TOLERANCE, self.policy.max_evaluations)
+        if not squares.has_finite_start:
             return None
-        solution = least_squares(
-            residual.residuals,
-            start,
-            jac=residual.jacobian,
-            bounds=(low, high),
-            x_scale="jac",
-            ftol=1e-6,
-            max_nfev=self.policy.max_evaluations,
-        )
-        return self._checked_rise(2.0 * float(solution.cost), np.insert(origin + solution.x * units, index, value))
+        best = origin + squares.minimise((low, high)) * units
+        return self._checked_rise(2.0 * squares.cost, np.insert(best, index, value))
 
     def _checked_rise(self, sum_of_squares: float, values: Array) -> float:
         rise = sum_of_squares - self._minimum
@@ -139,43 +137,6 @@ class ProfileLikelihood:
         if self._run_count > self.policy.max_runs:
             raise TooManyRunsError(self.policy.max_runs)
         return compressed_residuals(self._likelihood, values, self._sample, 0.0)
-
-
-class _ConstrainedResidual:
-    """Residuals with one parameter fixed, and their Jacobian by the others, in units from where they begin."""
-
-    def __init__(
-        self,
-        residuals: Callable[[Array], tuple[Array, Array]],
-        index: int,
-        fixed_value: float,
-        origin: Array,
-        units: Array,
-    ) -> None:
-        self._residuals, self._index, self._fixed_value, self._origin, self._units = (
-            residuals,
-            index,
-            fixed_value,
-            origin,
-            units,
-        )
-        self._evaluated_at: Array | None = None
-        self._cached: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
-
-    def residuals(self, offset: Array) -> Array:
-        return self._evaluate(offset)[0]
-
-    def jacobian(self, offset: Array) -> Array:
-        return self._evaluate(offset)[1]
-
-    def _evaluate(self, offset: Array) -> tuple[Array, Array]:
-        if self._evaluated_at is None or not np.array_equal(self._evaluated_at, offset):
-            residuals, jacobian = self._residuals(
-                np.insert(self._origin + offset * self._units, self._index, self._fixed_value)
-            )
-            self._cached = residuals, np.delete(jacobian, self._index, axis=1) * self._units
-            self._evaluated_at = offset.copy()
-        return self._cached
 
 
 def profile_intervals(
