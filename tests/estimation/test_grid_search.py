@@ -14,7 +14,7 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.innovations import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.score_test import PredictedGain, score_test
+from tautwire.estimation.score_test import PredictedGain, ScoreRun, score_tests
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SENSOR_DELAY, SLACK
 from tests.support.recordings import recorded
@@ -37,7 +37,7 @@ def looked(effects: dict[str, dict[str, float]]) -> tuple[IdentificationContext,
 @pytest.mark.validate
 def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     context, fitter, sample = looked({"slack": {"softness": 400.0}})
-    slopes = score_test(context.robot, (), [SOFT, VISCOUS], fitter, sample)
+    slopes = score_tests(context.robot, (), [SOFT, VISCOUS], [ScoreRun(fitter, sample)])[0]
     assert slopes[SOFT].gain == 0.0
     assert set(misleading_predictions(slopes, ALL)) == {SOFT}
     found = grid_search(context, context.robot, (), sample, misleading_predictions(slopes, ALL))
@@ -48,7 +48,7 @@ def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
 @pytest.mark.validate
 def test_a_delay_of_more_than_half_a_period_of_a_mode_is_seen_by_a_run() -> None:
     context, fitter, sample = looked({"sensor_delay": {"seconds": 0.17}})
-    slopes = score_test(context.robot, (), [LATE], fitter, sample)
+    slopes = score_tests(context.robot, (), [LATE], [ScoreRun(fitter, sample)])[0]
     found = grid_search(context, context.robot, (), sample, slopes)[LATE]
     assert slopes[LATE].values["tension_delay"] < 0.13
     assert found.values["tension_delay"] == pytest.approx(0.17, abs=0.011)

@@ -14,10 +14,11 @@ from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.preprocessing import prepare_data
 from tautwire.estimation.score_test import (
+    ScoreRun,
     ScoreStatistics,
     _predicted_gain,
     effect_sensitivities,
-    score_test,
+    score_tests,
     score_tests_in_workers,
     statistics_of_runs,
 )
@@ -39,7 +40,7 @@ SAMPLE = SPLIT.estimation
 
 @pytest.mark.validate
 def test_what_is_there_has_the_largest_score_and_its_values() -> None:
-    found = score_test(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
+    (found,) = score_tests(ROBOT, (), hypotheses(ROBOT), [ScoreRun(Fitter(NOISE), SAMPLE)])
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
     assert best.effect.name == "payload"
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
@@ -63,7 +64,7 @@ def test_a_declared_effect_is_expected_to_change_from_its_declared_value(
     data = split_data(robot, NOISE, recorded("three", 1, {name: true}), None).estimation
     # Single cables beside all of them share the columns of each.
     candidates = [on_all] if name == "payload" else [on_all, Hypothesis(effect, (2,))]
-    predicted = score_test(robot, (), candidates, Fitter(NOISE), data)[on_all]
+    predicted = score_tests(robot, (), candidates, [ScoreRun(Fitter(NOISE), data)])[0][on_all]
     ((parameter, value),) = true.items()
     assert predicted.gain > 100.0
     assert predicted.values[parameter] == pytest.approx(value, abs=0.2 * abs(declared[parameter] - value))
@@ -98,21 +99,23 @@ def test_a_column_of_all_cables_is_the_sum_of_those_of_each() -> None:
 
 
 @pytest.mark.validate
-def test_workers_compute_the_same_scores_by_all_densities_at_once() -> None:
+def test_workers_compute_the_same_scores_along_all_runs_at_once() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
     robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
     others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
-    densities = (0.0, 0.1)
-    here = [score_test(robot, accepted, others, Fitter(NOISE), SAMPLE, density) for density in densities]
+    fitter = Fitter(NOISE)
+    runs = [ScoreRun(fitter, SAMPLE), ScoreRun(fitter, SAMPLE, 0.1), ScoreRun(fitter, SAMPLE.head())]
+    here = [score_tests(robot, accepted, others, [run])[0] for run in runs]
     with WorkerPool(2) as workers:
-        context = IdentificationContext(ROBOT, Fitter(NOISE), SPLIT, workers=workers)
-        apart = score_tests_in_workers(context, robot, accepted, others, SAMPLE, densities)
+        context = IdentificationContext(ROBOT, fitter, SPLIT, workers=workers)
+        apart = score_tests_in_workers(context, robot, accepted, others, runs)
     for found, expected in zip(apart, here, strict=True):
         assert list(found) == list(expected)
         for hypothesis, prospect in expected.items():
             assert found[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
             assert found[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
-    assert any(here[0][hypothesis].gain != here[1][hypothesis].gain for hypothesis in others)
+    for other in here[1:]:
+        assert any(here[0][hypothesis].gain != other[hypothesis].gain for hypothesis in others)
 
 
 @pytest.mark.validate
@@ -123,7 +126,8 @@ def test_far_from_noise_a_coarse_grid_tells_what_scores_do_not(tmp_path: Path) -
     with WorkerPool(1) as workers:
         ready, *_ = prepare_data(robot, read_recording(fit, 4), read_recording(check, 4), workers)
     sample = ready.split.estimation.head()
-    found = [score_test(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
+    runs = [ScoreRun(ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
+    found = score_tests(robot, (), hypotheses(robot), runs)
     ranks = [sorted(prospects, key=lambda h: -prospects[h].gain) for prospects in found]
     payload = Hypothesis(BY_NAME["payload"], ())
     assert ranks[0].index(payload) > 10

@@ -21,7 +21,7 @@ from .estimation_data import DataSplit
 from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
-from .score_test import PredictedGain, score_tests_in_workers
+from .score_test import PredictedGain, ScoreRun, score_tests_in_workers
 from .speed_versions import split_with_other_interpolation
 from .time_limit import OutOfTimeError
 
@@ -221,19 +221,23 @@ def _predict_gains(context: IdentificationContext, search_round: SearchRound) ->
     Those are with process noise where the model is far from noise, and under a small disturbance where it has one: the
     fitted one may have taken up what is slow.
     """
-    robot, accepted = search_round.robot, search_round.accepted
+    robot, accepted, fitter = search_round.robot, search_round.accepted, context.fitter
     candidates = search_round.candidates(context.robot)
     # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
     data = context.split.estimation if search_round.is_white else context.head
-    follows_measurements = not search_round.is_white and not context.fitter.has_disturbance
-    densities = (0.0, context.policy.score_test.rough_noise_density) if follows_measurements else (0.0,)
-    predictions, *rough_predictions = score_tests_in_workers(context, robot, accepted, candidates, data, densities)
+    runs = [ScoreRun(fitter, data)]
+    if fitter.has_disturbance:
+        prior = disturbance_prior(robot, fitter.noise, context.policy.fit.disturbance)
+        runs.append(ScoreRun(fitter.with_disturbance(prior.median), context.head))
+    elif not search_round.is_white:
+        runs.append(ScoreRun(fitter, data, context.policy.score_test.rough_noise_density))
+    predictions, *others = score_tests_in_workers(context, robot, accepted, candidates, runs)
     misleading = misleading_predictions(predictions, robot.cable_numbers)
     predictions |= grid_search(context, robot, accepted, data, misleading)
-    if context.fitter.has_disturbance:
-        prior = disturbance_prior(robot, context.fitter.noise, context.policy.fit.disturbance)
-        under_median = replace(context, fitter=context.fitter.with_disturbance(prior.median))
-        (others,) = score_tests_in_workers(under_median, robot, accepted, candidates, context.head, (0.0,))
-        misleading = misleading_predictions(others, robot.cable_numbers)
-        return predictions, others | grid_search(under_median, robot, accepted, context.head, misleading)
-    return predictions, rough_predictions[0] if rough_predictions else {}
+    if not fitter.has_disturbance:
+        return predictions, others[0] if others else {}
+    under_median, misleading = (
+        replace(context, fitter=runs[1].fitter),
+        misleading_predictions(others[0], robot.cable_numbers),
+    )
+    return predictions, others[0] | grid_search(under_median, robot, accepted, context.head, misleading)

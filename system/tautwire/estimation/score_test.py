@@ -43,6 +43,19 @@ class PredictedGain:
 
 
 @dataclass(frozen=True)
+class ScoreRun:
+    """Run of a filter that scores are taken along: with a fitter's noise, over some data.
+
+    Far from noise the score misleads: an oscillation out of phase after a while asks for damping whatever it lacks.
+    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows the measurements, and the score is right.
+    """
+
+    fitter: Fitter
+    data: DataSet
+    acceleration_noise_density: float = 0.0
+
+
+@dataclass(frozen=True)
 class ScoreStatistics:
     """Score and Fisher information of the parameters, by the innovations ``e`` of all samples that count.
 
@@ -56,36 +69,13 @@ class ScoreStatistics:
     score: Array
 
 
-def score_test(
-    robot: Robot,
-    accepted: Sequence[Hypothesis],
-    candidates: Sequence[Hypothesis],
-    fitter: Fitter,
-    data: DataSet,
-    acceleration_noise_density: float = 0.0,
-) -> dict[Hypothesis, PredictedGain]:
-    """Score test of each hypothesis beside the accepted ones, whose parameters are refitted with it.
-
-    Far from noise the score misleads: an oscillation out of phase after a while asks for damping whatever it lacks.
-    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows the measurements, and the score is right.
-    """
-    (predictions,) = score_tests(robot, accepted, candidates, fitter, data, (acceleration_noise_density,))
-    return predictions
-
-
 def score_tests(
-    robot: Robot,
-    accepted: Sequence[Hypothesis],
-    candidates: Sequence[Hypothesis],
-    fitter: Fitter,
-    data: DataSet,
-    acceleration_noise_densities: Sequence[float],
+    robot: Robot, accepted: Sequence[Hypothesis], candidates: Sequence[Hypothesis], runs: Sequence[ScoreRun]
 ) -> list[dict[Hypothesis, PredictedGain]]:
-    """As :func:`score_test`, by each density."""
-    statistics = _statistics_by_density(robot, accepted, candidates, fitter, data, acceleration_noise_densities)
+    """Score test of each hypothesis beside the accepted ones, whose parameters are refitted with it, along each run."""
     return [
         {hypothesis: _best_gain(each, robot, accepted, hypothesis, candidates) for hypothesis in candidates}
-        for each in statistics
+        for each in _statistics_by_run(robot, accepted, candidates, runs)
     ]
 
 
@@ -107,15 +97,14 @@ def score_tests_in_workers(
     robot: Robot,
     accepted: Sequence[Hypothesis],
     candidates: Sequence[Hypothesis],
-    data: DataSet,
-    acceleration_noise_densities: Sequence[float],
+    runs: Sequence[ScoreRun],
 ) -> list[dict[Hypothesis, PredictedGain]]:
     """As :func:`score_tests`, with the effects shared out to the worker processes."""
-    fitter, count = context.fitter, context.workers.processes
+    count = context.workers.processes
     effects = list(dict.fromkeys(hypothesis.effect for hypothesis in candidates))
     shares = [[h for h in candidates if h.effect in effects[number::count]] for number in range(count)]
-    calls = [(robot, accepted, own, fitter, data, acceleration_noise_densities) for own in shares if own]
-    predictions: list[dict[Hypothesis, PredictedGain]] = [{} for _ in acceleration_noise_densities]
+    calls = [(robot, accepted, own, runs) for own in shares if own]
+    predictions: list[dict[Hypothesis, PredictedGain]] = [{} for _ in runs]
     for _, results in context.workers.map_unordered(score_tests, calls):
         for of_all, of_share in zip(predictions, results, strict=True):
             of_all.update(of_share)
@@ -133,27 +122,25 @@ def score_statistics(
 
     Those begin as the robot file declares them, or neutral.
     """
-    (statistics,) = _statistics_by_density(robot, accepted, hypotheses, fitter, data, (0.0,))
+    (statistics,) = _statistics_by_run(robot, accepted, hypotheses, [ScoreRun(fitter, data)])
     return statistics
 
 
-def _statistics_by_density(
-    robot: Robot,
-    accepted: Sequence[Hypothesis],
-    hypotheses: Sequence[Hypothesis],
-    fitter: Fitter,
-    data: DataSet,
-    acceleration_noise_densities: Sequence[float],
+def _statistics_by_run(
+    robot: Robot, accepted: Sequence[Hypothesis], hypotheses: Sequence[Hypothesis], runs: Sequence[ScoreRun]
 ) -> Iterator[ScoreStatistics]:
-    """Score statistics by each density; what is compiled for the effects, which takes longest, serves all."""
-    likelihood, values = fitter.likelihood(robot, accepted, data)
+    """Score statistics along each run; what is compiled for the effects, which takes longest, serves all."""
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
-    effects = effect_sensitivities(data.placed(robot), hypotheses, likelihood.model.state_names)
-    for density in acceleration_noise_densities:
-        runs = linearise_filter(likelihood, values, data.recording, density)
-        yield statistics_of_runs(runs, effects, data.rows, columns, values)
+    compiled: dict[Robot, tuple[EffectSensitivities, ...]] = {}
+    for run in runs:
+        likelihood, values = run.fitter.likelihood(robot, accepted, run.data)
+        placed = run.data.placed(robot)
+        if placed not in compiled:
+            compiled[placed] = effect_sensitivities(placed, hypotheses, likelihood.model.state_names)
+        segments = linearise_filter(likelihood, values, run.data.recording, run.acceleration_noise_density)
+        yield statistics_of_runs(segments, compiled[placed], run.data.rows, columns, values)
 
 
 def statistics_of_runs(
