@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tautwire.errors import RecordingError
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
@@ -20,7 +21,7 @@ from tests.support.recordings import recorded
 from tests.support.rigid_filter import innovations_and_variances
 from tests.support.rigid_motion import RigidRobot
 from tests.support.rigid_recordings import rigid_recording, with_noise
-from tests.support.rigid_robots import crane_robot, octahedral_robot
+from tests.support.rigid_robots import crane_robot, octahedral_robot, underactuated_robot
 from tests.support.robots import example
 
 OCTAHEDRAL, CRANE = with_noise(octahedral_robot()), with_noise(crane_robot())
@@ -80,6 +81,19 @@ def test_the_sign_of_a_quaternion_and_a_tracker_that_loses_the_platform_are_no_m
     assert np.all(np.isnan(lost.values[40:80, -3:]))
     assert lost.values[:40] == pytest.approx(whole.values[:40], abs=1e-9)
     assert np.nanmean(lost.values[40:] ** 2) == pytest.approx(1.0, abs=0.2)
+
+
+def test_beside_a_disturbance_free_parameters_leave_innovations_as_they_are() -> None:
+    """Of a platform on few cables the static start has no formula, whether or not something of it is free."""
+    robot = with_noise(underactuated_robot()).with_effect(EffectSetting("payload", {"mass": 0.5}))
+    recording = rigid_recording(robot, 60)
+    noise = estimate_noise(robot, recording)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    fixed, free = (
+        Likelihood(robot, parameters, noise, 0.02).innovations(recording, [0.5] * len(parameters)).values
+        for parameters in ([], [FreeParameter(0, "mass")])
+    )
+    assert fixed == pytest.approx(free, rel=1e-9, abs=1e-9)
 
 
 def test_a_platform_that_is_turned_by_more_than_the_filter_can_follow_is_refused() -> None:

@@ -26,7 +26,7 @@ import numpy as np
 from .step_integration import compiled, multiply
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "ea93b8b956803d8a0a3ceddcc3dd3a0ffa87dbc13cbbc49f7cfdd7c95dcc286b"
+STEP_INTEGRATION_SHA256 = "fd2f20ddf94da6c2b5cacbb45cb1e8c894f1859957ac1ab7eba2c754dc7c791a"
 
 
 class DisturbanceStates(NamedTuple):

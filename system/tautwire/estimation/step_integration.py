@@ -253,20 +253,21 @@ def _fill_in(integration: Integration) -> None:
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
     slopes, factors = integration.static_start.results[1], integration.preparation.results[1][0]
     by_state, by_constants = integration.buffers.by_state, integration.buffers.by_constants
-    size, driving, constant_count = len(by_state), len(factors), integration.constant_count
-    theta_count = len(by_constants)
+    size, driving, parameter_count = len(by_state), len(factors), len(integration.direct)
+    first_constant = parameter_count + driving
+    constants_end = first_constant + integration.constant_count
     if len(slopes) > 0:
-        theta_count -= slopes.shape[1]
-        rows, parameter_count = integration.buffers.rows[: len(slopes)], len(slopes) - constant_count
-        multiply(slopes, by_constants[theta_count:], rows)
+        rows = integration.buffers.rows[: len(slopes)]
+        multiply(slopes, by_constants[constants_end:], rows)
         add_to_matrix(by_constants[:parameter_count], 1.0, rows[:parameter_count])
-        add_to_matrix(by_constants[theta_count - constant_count : theta_count], 1.0, rows[parameter_count:])
-    result, first_constant = integration.transition, theta_count - constant_count
+        add_to_matrix(by_constants[first_constant:constants_end], 1.0, rows[parameter_count:])
+    result = integration.transition
     assign_matrix(result[:size], by_state)
-    assign_matrix(result[size : size + constant_count], by_constants[first_constant:theta_count])
+    first_driving = size + integration.constant_count
+    assign_matrix(result[size:first_driving], by_constants[first_constant:constants_end])
     for i in range(driving):
         for j in range(size):
-            result[size + constant_count + i, j] = factors[i] * by_constants[first_constant - driving + i, j]
+            result[first_driving + i, j] = factors[i] * by_constants[parameter_count + i, j]
     assign_matrix(integration.direct, by_constants)
 
 
