@@ -10,11 +10,9 @@ Source: Golub and Van Loan (2013), Matrix Computations, sec. 5.3.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from .estimation_data import DataSet
 from .likelihood import Likelihood
@@ -23,8 +21,6 @@ Array = NDArray[np.float64]
 
 # Of the largest eigenvalue: smaller ones are rounding errors.
 MIN_EIGENVALUE_RATIO = 1e-13
-# In succession, each a quarter of the last: a minimum within the last would be a small part of what they rise.
-MAX_REJECTED_STEPS = 2
 
 
 def compressed_residuals(
@@ -70,29 +66,24 @@ def _equivalent_rows(fisher_information: Array, score: Array, sum_of_squares: fl
     return np.append(projected, unexplained), np.vstack([slopes, np.zeros((1, count))])
 
 
-class StepsOnlyRiseError(Exception):
-    """Each step leads up from the best point, and the last one hardly: there is nothing to gain between."""
+class NothingToGainError(Exception):
+    """Steps that were rejected tell that there is no better point between: a fit ends at its best one."""
 
 
-class LeastSquares:
-    """Least squares of residuals (m,) whose slopes (m, p) need not be their exact derivatives, from a start (p,).
+class StoppingRule:
+    """Stopping rule for least squares of residuals (m,) whose slopes (m, p) need not be their exact derivatives.
 
     The slopes of innovations hold the filter's gain, so where they vanish is not quite where the cost is least. A
-    trust-region method then rejects step after step until they are as short as numbers go. It ends here where the last
-    of some rejected steps costs no more than ``cost_tolerance`` allows, a relative change of the cost.
+    trust-region method then rejects step after step, each a quarter as long, until they are as short as numbers go.
+    ``residuals`` raise NothingToGainError where a parabola through the last two of these falls by no more than
+    ``cost_tolerance``, a share of the cost. ``best_point`` (p,) is the one of least cost, at first the start.
     """
 
-    def __init__(
-        self,
-        evaluate: Callable[[Array], tuple[Array, Array]],
-        start: Array,
-        cost_tolerance: float,
-        max_evaluations: int,
-    ) -> None:
-        self._evaluate, self._cost_tolerance, self._max_evaluations = evaluate, cost_tolerance, max_evaluations
+    def __init__(self, evaluate: Callable[[Array], tuple[Array, Array]], start: Array, cost_tolerance: float) -> None:
+        self._evaluate, self._cost_tolerance = evaluate, cost_tolerance
         self._evaluated_at, self._evaluated = start.copy(), evaluate(start)
-        self._best_at, self._best = self._evaluated_at, self._evaluated
-        self._accepted_cost, self._rejected_steps = np.inf, 0
+        self.best_point, self._best = self._evaluated_at, self._evaluated
+        self._accepted_cost, self._last_rise = np.inf, np.nan
 
     @property
     def has_finite_start(self) -> bool:
@@ -105,38 +96,27 @@ class LeastSquares:
         return _cost(self._best[0])
 
     @property
-    def jacobian(self) -> Array:
+    def best_jacobian(self) -> Array:
         """Slopes at the best point (m, p)."""
         return self._best[1]
 
-    def minimise(self, bounds: tuple[Array, Array]) -> Array:
-        """The best point (p,) within bounds, lower and upper."""
-        with suppress(StepsOnlyRiseError):
-            least_squares(
-                self._residuals_of_step,
-                self._best_at,
-                jac=self._jacobian_at,
-                bounds=bounds,
-                x_scale="jac",
-                ftol=self._cost_tolerance,
-                max_nfev=self._max_evaluations,
-            )
-        return self._best_at
-
-    def _residuals_of_step(self, point: Array) -> Array:
+    def residuals(self, point: Array) -> Array:
+        """Residuals at the next step's end (m,)."""
         residuals, _ = self._at(point)
         cost = _cost(residuals)
         if cost < self.cost:
-            self._best_at, self._best = self._evaluated_at, self._evaluated
+            self.best_point, self._best = self._evaluated_at, self._evaluated
         if cost < self._accepted_cost:
-            self._accepted_cost, self._rejected_steps = cost, 0
+            self._accepted_cost, self._last_rise = cost, np.nan
             return residuals
-        self._rejected_steps += 1
-        if self._rejected_steps >= MAX_REJECTED_STEPS and cost - self._accepted_cost <= self._cost_tolerance * cost:
-            raise StepsOnlyRiseError
+        rise = cost - self._accepted_cost
+        if _fall_between(self._last_rise, rise) <= self._cost_tolerance * self._accepted_cost:
+            raise NothingToGainError
+        self._last_rise = rise
         return residuals
 
-    def _jacobian_at(self, point: Array) -> Array:
+    def jacobian(self, point: Array) -> Array:
+        """Slopes at a point (m, p)."""
         return self._at(point)[1]
 
     def _at(self, point: Array) -> tuple[Array, Array]:
@@ -147,3 +127,14 @@ class LeastSquares:
 
 def _cost(residuals: Array) -> float:
     return 0.5 * float(residuals @ residuals)
+
+
+def _fall_between(far_rise: float, near_rise: float) -> float:
+    """How far a parabola falls below its start that has risen at a distance, and at a quarter of that.
+
+    Infinite where that tells nothing: it is no valley, or one of them is no number.
+    """
+    slope, bend = (16.0 * near_rise - far_rise) / 3.0, 8.0 / 3.0 * (far_rise - 4.0 * near_rise)
+    if not (np.isfinite(far_rise) and bend > 0.0):
+        return np.inf
+    return float(min(slope, 0.0) ** 2 / (2.0 * bend))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
@@ -20,7 +22,7 @@ from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .innovations import Innovations
 from .kalman_filter import Noise
 from .likelihood import Likelihood
-from .normal_equations import LeastSquares, compressed_residuals
+from .normal_equations import NothingToGainError, StoppingRule, compressed_residuals
 from .policy import DEFAULT_POLICY, FitPolicy
 
 Array = NDArray[np.float64]
@@ -139,11 +141,21 @@ class Fitter:
                 scaled = max((scaled, scaled_start), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
             residual.origin = scaled - 1.0
-            squares = LeastSquares(residual.evaluate, np.ones(len(free)), stage_tolerance, self.policy.max_evaluations)
-            if not squares.has_finite_start:
+            rule = StoppingRule(residual.evaluate, np.ones(len(free)), stage_tolerance)
+            if not rule.has_finite_start:
                 raise NoFitError(scaled * scale)
-            scaled = residual.origin + squares.minimise((lower - residual.origin, upper - residual.origin))
-        return _scaled_back(robot, free, scaled, squares.jacobian)
+            with suppress(NothingToGainError):
+                least_squares(
+                    rule.residuals,
+                    rule.best_point,
+                    jac=rule.jacobian,
+                    bounds=(lower - residual.origin, upper - residual.origin),
+                    x_scale="jac",
+                    ftol=stage_tolerance,
+                    max_nfev=self.policy.max_evaluations,
+                )
+            scaled = residual.origin + rule.best_point
+        return _scaled_back(robot, free, scaled, rule.best_jacobian)
 
     def _first_near(
         self, starts: Sequence[Robot], chosen: Collection[Hypothesis], data: DataSet, min_log_likelihood: float

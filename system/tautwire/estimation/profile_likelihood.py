@@ -15,17 +15,18 @@ Statistics 37(1), 87-94.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, least_squares
 
 from ..errors import TautwireError
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .likelihood import Likelihood
-from .normal_equations import LeastSquares, compressed_residuals
+from .normal_equations import NothingToGainError, StoppingRule, compressed_residuals
 from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds, parameter_scales
 from .policy import DEFAULT_POLICY, ProfileLikelihoodPolicy
 from .worker_pool import WorkerPool
@@ -112,11 +113,20 @@ class ProfileLikelihood:
             residuals, jacobian = self._residuals(np.insert(origin + offset * units, index, value))
             return residuals, np.delete(jacobian, index, axis=1) * units
 
-        squares = LeastSquares(evaluate, start, COST_TOLERANCE, self.policy.max_evaluations)
-        if not squares.has_finite_start:
+        rule = StoppingRule(evaluate, start, COST_TOLERANCE)
+        if not rule.has_finite_start:
             return None
-        best = origin + squares.minimise((low, high)) * units
-        return self._checked_rise(2.0 * squares.cost, np.insert(best, index, value))
+        with suppress(NothingToGainError):
+            least_squares(
+                rule.residuals,
+                start,
+                jac=rule.jacobian,
+                bounds=(low, high),
+                x_scale="jac",
+                ftol=COST_TOLERANCE,
+                max_nfev=self.policy.max_evaluations,
+            )
+        return self._checked_rise(2.0 * rule.cost, np.insert(origin + rule.best_point * units, index, value))
 
     def _checked_rise(self, sum_of_squares: float, values: Array) -> float:
         rise = sum_of_squares - self._minimum
