@@ -51,55 +51,54 @@ FULL_TRANSITION[:MOVING, :FROM] = TRANSITION
 START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0.1, 0.3])
 
 
-def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFunction, list[BoundFunction]]:
-    """Functions of a sample of a second; rates are constant in it, and their Jacobian is that of one part.
-
-    The constants are two parameters, a driving state, an uncertain constant, and the static start: what this changes is
-    a part of what the latter and the parameters do.
-    """
-    x, number, held_numbers = SX.sym("x", SIZE), SX.sym("number"), SX.sym("held", STATICS)
-    constants, moving = SX.sym("constants", PARAMETERS + 2 + STATICS), SX.sym("moving", MOVING)
-    held, states, outputs = constants[PARAMETERS + 2 :], SX(STATES_BY_STATICS), SX(OUTPUTS_BY_STATICS)
+def bound_outputs(count: int, state: Array, static_values: Array) -> BoundFunction:
+    """Outputs of a sample; what the static start changes of them is a part of what constant and parameters do."""
+    x, held = SX.sym("x", SIZE), SX.sym("held", STATICS)
     other_by_state = BY_STATE.copy()
     other_by_state[:, MOVING] -= OUTPUTS_BY_STATICS @ STATICS_BY_CONSTANT
     other_by_parameters = BY_PARAMETERS - OUTPUTS_BY_STATICS @ STATICS_BY_PARAMETERS.T
-    expected = mtimes(SX(other_by_state), x) + mtimes(outputs, held_numbers - SX(STATIC_VALUES))
-    output_results = [expected, SX(other_by_state), horzcat(SX(other_by_parameters), outputs)]
-    rates = SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
+    expected = mtimes(SX(other_by_state), x) + mtimes(SX(OUTPUTS_BY_STATICS), held - SX(STATIC_VALUES))
+    results = [expected, SX(other_by_state), SX(np.hstack([other_by_parameters, OUTPUTS_BY_STATICS]))]
+    return CompiledFunction(Function("outputs", [x, held], results)).bind(count, state[:, None], static_values)
+
+
+def bound_static_start(count: int, state: Array) -> BoundFunction:
+    """Numbers that follow linearly from the constant and the parameters, which are zero."""
+    constant, by_others = SX.sym("constant"), horzcat(SX(STATICS_BY_PARAMETERS.T), SX(STATICS_BY_CONSTANT))
+    results = [SX(STATIC_VALUES) + SX(STATICS_BY_CONSTANT) * constant, by_others]
+    statics = CompiledFunction(Function("statics", [constant], results))
+    return statics.bind(count, state[MOVING : MOVING + 1, None])
+
+
+def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFunction, list[BoundFunction]]:
+    """Functions of a sample of a second; rates are constant in it, and their Jacobian is that of one part.
+
+    The constants are two parameters, a driving state, an uncertain constant, and the static start.
+    """
+    x, number, held = SX.sym("x", SIZE), SX.sym("number"), SX.sym("held", STATICS)
+    constants, moving = SX.sym("constants", PARAMETERS + 2 + STATICS), SX.sym("moving", MOVING)
+    rates, by_statics = SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING), SX(STATES_BY_STATICS)
     by_constant = SX(TRANSITION[:, MOVING] - STATES_BY_STATICS @ STATICS_BY_CONSTANT)
     by_driving = SX(TRANSITION[:, MOVING + 1])
     driven = by_driving * constants[PARAMETERS] + by_constant * constants[PARAMETERS + 1]
-    moved = moving + mtimes(rates, moving) + driven + mtimes(states, held - SX(STATIC_VALUES))
+    shifted = mtimes(by_statics, constants[PARAMETERS + 2 :] - SX(STATIC_VALUES))
     by_parameters = SX(DIRECT - STATES_BY_STATICS @ STATICS_BY_PARAMETERS.T)
-    by_constants = horzcat(by_parameters, by_driving, by_constant, states)
-    process = Function("process", [number], [SX(DECAY), SX(PROCESS_NOISE)])
-    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, 1)]
-    constant, by_others = SX.sym("constant"), horzcat(SX(STATICS_BY_PARAMETERS.T), SX(STATICS_BY_CONSTANT))
-    statics = Function("statics", [constant], [SX(STATIC_VALUES) + SX(STATICS_BY_CONSTANT) * constant, by_others])
-    static_start = CompiledFunction(statics).bind(count, state[MOVING : MOVING + 1, None])
-    static_values = static_start.results[0].T
-    prepared = Function("preparation", [x, held_numbers], [vertcat(SX(PARAMETERS, 1), x[3], x[2], held_numbers), SX(1)])
-    preparation = CompiledFunction(prepared).bind(count, state[:, None], static_values)
-    part = Function("part", [moving, constants, number], [moved])
+    part = Function("part", [moving, constants, number], [moving + mtimes(rates, moving) + driven + shifted])
+    by_constants = horzcat(by_parameters, by_driving, by_constant, by_statics)
     slope = Function("slope", [moving, constants, number], [rates, by_constants])
+    process = Function("process", [number], [SX(DECAY), SX(PROCESS_NOISE)])
+    static_start = bound_static_start(count, state)
+    prepared = [vertcat(SX(PARAMETERS, 1), x[3], x[2], held), SX(1)]
+    preparation = CompiledFunction(Function("preparation", [x, held], prepared)).bind(
+        count, state[:, None], static_start.results[0].T
+    )
+    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, 1)]
     of_part = CompiledFunction(part).bind(count, buffers[0].T, preparation.results[0].T, buffers[2])
     of_slope = CompiledFunction(slope).bind(count, buffers[1].T, preparation.results[0].T, buffers[2])
-    division = Division(1, 1, 1, 0)
-    integration = Integration(
-        step(static_start),
-        1,
-        step(preparation),
-        step(of_part),
-        step(of_slope),
-        division,
-        *buffers,
-        np.ones(count),
-        np.zeros((FROM, MOVING)),
-        np.zeros((PARAMETERS, MOVING)),
-        integration_buffers(step(of_slope), division),
-    )
-    sensing = Function("outputs", [x, held_numbers], output_results)
-    of_outputs = CompiledFunction(sensing).bind(count, state[:, None], static_values)
+    division, steps = Division(1, 1, 1, 0), [step(each) for each in (preparation, of_part, of_slope)]
+    results = (np.zeros((FROM, MOVING)), np.zeros((PARAMETERS, MOVING)), integration_buffers(steps[-1], division))
+    integration = Integration(step(static_start), 1, *steps, division, *buffers, np.ones(count), *results)
+    of_outputs = bound_outputs(count, state, static_start.results[0].T)
     of_process = CompiledFunction(process).bind(count, np.zeros((1, count)))
     return of_outputs, integration, of_process, [static_start, preparation, of_part, of_slope]
 

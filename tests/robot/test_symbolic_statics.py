@@ -7,13 +7,11 @@ from dataclasses import replace
 import casadi
 import numpy as np
 import pytest
-from casadi import SX
 from scipy.spatial.transform import Rotation
 
 from tautwire.robot.rigid_equilibrium import static_equilibrium
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
-from tautwire.robot.symbolic_statics import ImplicitRoot
 from tautwire.robot.uncertain_parameters import uncertain_parameters
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.rigid_robots import crane_robot, hung_beam, octahedral_robot, suspended_robot, underactuated_robot
@@ -48,16 +46,16 @@ def test_tensions_of_six_cables_and_more_follow_a_load_as_statics_has_it(robot: 
     assert rotation == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-@pytest.mark.parametrize("value", [0.0, 0.005])
+@pytest.mark.parametrize(("value", "error"), [(0.0, 1e-10), (0.005, 1e-10), (0.02, 1e-6)])
 @pytest.mark.parametrize("robot", [underactuated_robot(), suspended_robot(3)], ids=["four cables", "three cables"])
-def test_orientation_and_tensions_of_few_cables_follow_a_shifted_mass(robot: Robot, value: float) -> None:
+def test_orientation_and_tensions_of_few_cables_follow_a_shifted_mass(robot: Robot, value: float, error: float) -> None:
     equilibrium = static_equilibrium(with_value(robot, "centre_of_mass", "x", value))
     rotation, tensions = start_of(model_of(robot, "centre_of_mass", "x"), value)
     declared, turned = (
         Rotation.from_quat(np.roll(each, -1)) for each in (robot.platform.start_orientation, equilibrium.orientation)
     )
-    assert rotation == pytest.approx((turned * declared.inv()).as_rotvec(), abs=1e-8)
-    assert tensions == pytest.approx(equilibrium.tensions, rel=1e-6)
+    assert rotation == pytest.approx((turned * declared.inv()).as_rotvec(), abs=error)
+    assert tensions == pytest.approx(equilibrium.tensions, rel=10.0 * error)
 
 
 def test_the_first_derivative_of_an_orientation_is_that_of_statics() -> None:
@@ -112,11 +110,3 @@ def test_derivatives_of_the_static_start_are_differences_of_its_values_far_from_
         more, less = (np.array(static_start(point + sign * step)[0]).ravel() for sign in (1.0, -1.0))
         assert slopes[:, number] == pytest.approx((more - less) / (2.0 * width), rel=1e-5, abs=1e-5)
     assert np.linalg.matrix_rank(slopes) > 3
-
-
-def test_of_a_root_that_is_not_the_only_one_the_derivative_is_the_smallest() -> None:
-    unknowns, parameter = SX.sym("z", 2), SX.sym("p")
-    inverse = np.array([[0.5], [0.5]])
-    values, equations = casadi.vertcat(0.5 * parameter, 0.5 * parameter), casadi.sum1(unknowns) - parameter
-    root = ImplicitRoot(unknowns, values, equations, inverse, inverse @ np.array([[1.0, 1.0]]))
-    assert np.array(casadi.Function("slope", [unknowns], [root.jacobian(parameter)])(0.0)).ravel() == pytest.approx(0.5)

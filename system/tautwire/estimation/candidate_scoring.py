@@ -231,13 +231,11 @@ def _predict_gains(context: IdentificationContext, search_round: SearchRound) ->
         runs.append(ScoreRun(fitter.with_disturbance(prior.median), context.head))
     elif not search_round.is_white:
         runs.append(ScoreRun(fitter, data, context.policy.score_test.rough_noise_density))
-    predictions, *others = score_tests_in_workers(context, robot, accepted, candidates, runs)
+    predictions, *by_other_run = score_tests_in_workers(context, robot, accepted, candidates, runs)
     misleading = misleading_predictions(predictions, robot.cable_numbers)
     predictions |= grid_search(context, robot, accepted, data, misleading)
     if not fitter.has_disturbance:
-        return predictions, others[0] if others else {}
-    under_median, misleading = (
-        replace(context, fitter=runs[1].fitter),
-        misleading_predictions(others[0], robot.cable_numbers),
-    )
-    return predictions, others[0] | grid_search(under_median, robot, accepted, context.head, misleading)
+        return predictions, by_other_run[0] if by_other_run else {}
+    under_median = replace(context, fitter=runs[1].fitter)
+    misleading = misleading_predictions(by_other_run[0], robot.cable_numbers)
+    return predictions, by_other_run[0] | grid_search(under_median, robot, accepted, context.head, misleading)

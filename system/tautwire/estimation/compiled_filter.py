@@ -22,7 +22,7 @@ from .kalman_filter import (
     output_function,
     preparation_function,
     process_function,
-    rate_jacobian_function,
+    rate_jacobians_function,
     simulation_function,
     slope_function,
     static_start_function,
@@ -128,9 +128,9 @@ class CompiledFilter:
         return CompiledFunction(simulation_function(self.model, self._cable_count, self._substeps), carried=1)
 
     @cached_property
-    def rate_jacobian(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
-        return CompiledFunction(rate_jacobian_function(self.model, self._cable_count))
+    def rate_jacobians(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.rate_jacobians_function`."""
+        return CompiledFunction(rate_jacobians_function(self.model, self._cable_count))
 
     @cached_property
     def given_constants(self) -> CompiledFilter:

@@ -102,8 +102,7 @@ class EffectSensitivities:
     ) -> None:
         uncertain, reference = uncertain_parameters(extended_robot), extended_robot.platform.start_orientation
         complete = symbolic_model(extended_robot, [*free, *fixed], uncertain, reference)
-        static_start = _StaticStart.of(complete, len(uncertain), len(free))
-        model = with_statics_as_parameters(complete)
+        static_start, model = _StaticStart.of(complete, len(uncertain), len(free)), with_statics_as_parameters(complete)
         shared_indices = [model.state_names.index(name) for name in state_names]
         effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
         z, p = model.states[effect_indices], model.parameters[: len(free)]
@@ -121,22 +120,12 @@ class EffectSensitivities:
             return casadi.jacobian(expression, p) + through_states + through_start
 
         self._effect_state_count, self._parameter_count = len(effect_indices), len(free)
-        self._forcing_function = CompiledFunction(
-            Function(
-                "moved",
-                [*arguments, *instant.symbols],
-                [total_derivative(model.rates[shared_indices]), total_derivative(outputs)],
-            )
-        )
-        rates = Function(
-            "rates",
-            arguments,
-            [casadi.densify(model.rates[effect_indices]), total_derivative(model.rates[effect_indices])],
-        )
+        forcings = [total_derivative(model.rates[shared_indices]), total_derivative(outputs)]
+        self._forcing_function = CompiledFunction(Function("moved", [*arguments, *instant.symbols], forcings))
+        effect_rates = model.rates[effect_indices]
+        rates = Function("rates", arguments, [casadi.densify(effect_rates), total_derivative(effect_rates)])
         self._step_function = CompiledFunction(_effect_state_step(rates, cable_count), carried=2)
-        start_sensitivities = casadi.jacobian(complete.start[shared_indices], p)
-        starts = [casadi.densify(each) for each in (complete.start[effect_indices], start_sensitivities)]
-        self._start_function = Function("start", [complete.parameters], starts)
+        self._start_function = _start_function(complete, shared_indices, effect_indices, p)
         self._static_start_function = CompiledFunction(static_start.function)
         self._constants = slice(len(shared_indices) - len(uncertain), len(shared_indices))
         self._input_count = model.inputs.numel()
@@ -216,6 +205,15 @@ class _StaticStart:
         column = casadi.vertcat(model.static_start.values, SX(by_parameters.nz[:]))
         function = Function("static_start", [model.parameters, constants], [casadi.densify(column)])
         return cls(SX.sym("slopes_of_start", by_parameters.sparsity()), function)
+
+
+def _start_function(
+    model: SymbolicModel, shared_indices: Sequence[int], effect_indices: Sequence[int], parameters: SX
+) -> Function:
+    """The effect's states at the start, and the sensitivities of the others there to some parameters."""
+    sensitivities = casadi.jacobian(model.start[list(shared_indices)], parameters)
+    starts = [casadi.densify(each) for each in (model.start[list(effect_indices)], sensitivities)]
+    return Function("start", [model.parameters], starts)
 
 
 def _present_setting(robot: Robot, effect: Effect, cables: tuple[int, ...]) -> EffectSetting:

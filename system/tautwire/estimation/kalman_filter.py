@@ -185,7 +185,7 @@ def slope_function(
     return Function("slopes", [reduced.states, reduced.parameters, speed, later, index], list(results))
 
 
-def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
+def rate_jacobians_function(model: SymbolicModel, cable_count: int) -> Function:
     """Jacobians of the rates of a model's states by these (n, n) and by the static start (n, s).
 
     Arguments: state, parameters, static start, speed.
@@ -194,7 +194,7 @@ def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
     statics = model.static_start.symbols
     jacobians = [casadi.jacobian(model.rates_by_statics, each) for each in (model.states, statics)]
     jacobians = casadi.substitute(jacobians, [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
-    return Function("rate_jacobian", [model.states, model.parameters, statics, speed], jacobians)
+    return Function("rate_jacobians", [model.states, model.parameters, statics, speed], jacobians)
 
 
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:

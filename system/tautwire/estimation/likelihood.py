@@ -117,7 +117,7 @@ class Likelihood:
         functions, theta, count = self._filter_functions, self.arguments(parameters)[:, None], states.shape[1]
         first = len(states) - len(self.uncertain)
         statics, slopes = functions.static_start(count, theta, states[first:])
-        jacobians = functions.rate_jacobian(count, states, theta, statics, speed)
+        jacobians = functions.rate_jacobians(count, states, theta, statics, speed)
         by_state, by_statics = (by_sample(each, count) for each in jacobians)
         # Uncertain constants have no rates.
         by_state[:, :first, first:] += by_statics[:, :first] @ by_sample(slopes, count)[:, :, len(theta) :]

@@ -133,6 +133,7 @@ def _statistics_by_run(
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
+    # A disturbance has states of its own, behind those of the model that effects act on.
     compiled: dict[Robot, tuple[EffectSensitivities, ...]] = {}
     for run in runs:
         likelihood, values = run.fitter.likelihood(robot, accepted, run.data)

@@ -19,8 +19,9 @@ from .platform_symbols import StateIndices, platform_symbols
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import EffectSetting, Robot
 from .static_equilibrium import start_orientation
+from .static_start import ImplicitRoot, StaticStart, at_roots
 from .symbolic_equations import CASADI_MATHEMATICS, Equations, MechanicalVariables, minimal_equations
-from .symbolic_statics import ImplicitRoot, StaticStart, at_roots, held_statics, symbolic_statics
+from .symbolic_statics import held_statics, symbolic_statics
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 # Instead of an effect's index: a parameter of the formulas.

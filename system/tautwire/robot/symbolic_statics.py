@@ -24,6 +24,7 @@ from .robot_assembly import CableComponent
 from .schema import Robot
 from .static_equilibrium import SINGULARITY_TOLERANCE, start_orientation, static_tensions
 from .static_load import static_load
+from .static_start import ImplicitRoot, StaticStart
 from .tension_distribution import DEFAULT_LIMITS
 
 Array = NDArray[np.float64]
@@ -40,40 +41,6 @@ STATIONARITY_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
-class ImplicitRoot:
-    """Root of equations with symbolic parameters: its ``unknowns`` (k,), and their ``values`` by the parameters.
-
-    Of ``equations`` F (m,) and a constant ``inverse`` M (k, m) of their Jacobian it is the limit of ``z <- z - M F``.
-    """
-
-    unknowns: SX
-    values: SX
-    equations: SX
-    inverse: Array
-    projector: Array
-
-    def jacobian(self, symbols: SX) -> SX:
-        """Derivatives of the unknowns by parameters (k, p), in which the unknowns are symbols.
-
-        By the implicit function theorem, with the projector P on what M reaches,
-
-            (M F_z + 1 - P) dz/dp = -M F_p
-
-        A small part of the operations that derivatives of each iteration take.
-        """
-        by_unknowns, by_symbols = (casadi.jacobian(self.equations, each) for each in (self.unknowns, symbols))
-        near_identity = casadi.mtimes(SX(self.inverse), by_unknowns) + SX(np.eye(len(self.projector)) - self.projector)
-        return -casadi.solve(near_identity, casadi.mtimes(SX(self.inverse), by_symbols))
-
-    def at(self, symbols: SX, values: SX) -> ImplicitRoot:
-        """The root where some parameters have other values, with unknowns of its own."""
-        unknowns = SX.sym("unknowns_there", self.unknowns.numel())
-        (root,) = casadi.substitute([self.values], [symbols], [values])
-        (equations,) = casadi.substitute([self.equations], [self.unknowns, symbols], [unknowns, values])
-        return replace(self, unknowns=unknowns, values=root, equations=equations)
-
-
-@dataclass(frozen=True)
 class SymbolicStatics:
     """The static start: ``tensions`` (n,) in N, and ``rotation`` (3,) in rad from a reference, empty of a point mass.
 
@@ -85,40 +52,6 @@ class SymbolicStatics:
     rotation: SX
     orientation: Quaternion
     roots: tuple[ImplicitRoot, ...] = ()
-
-
-@dataclass(frozen=True)
-class StaticStart:
-    """Numbers of the static start that depend on parameters: ``symbols`` for them (s,), and their ``expressions``.
-
-    The latter have parameters and the unknowns of the ``roots`` as symbols.
-    """
-
-    symbols: SX
-    expressions: SX
-    roots: tuple[ImplicitRoot, ...]
-
-    @property
-    def values(self) -> SX:
-        """The numbers by the parameters alone (s,)."""
-        return at_roots([self.expressions], self.roots)[0]
-
-    def jacobian(self, symbols: SX) -> SX:
-        """Derivatives of the numbers by parameters (s, p)."""
-        result = casadi.jacobian(self.expressions, symbols)
-        for root in self.roots:
-            by_unknowns = casadi.jacobian(self.expressions, root.unknowns)
-            result += casadi.mtimes(by_unknowns, root.jacobian(symbols))
-        return at_roots([result], self.roots)[0]
-
-
-def at_roots(expressions: Sequence[SX], roots: Sequence[ImplicitRoot]) -> list[SX]:
-    """Expressions with the values of unknowns in their place."""
-    if not roots:
-        return list(expressions)
-    unknowns, values = ([getattr(root, name) for root in roots] for name in ("unknowns", "values"))
-    substituted: list[SX] = casadi.substitute(list(expressions), unknowns, values)
-    return substituted
 
 
 def symbolic_statics(
@@ -221,7 +154,7 @@ def _stationarity(unknowns: SX, multipliers: SX, lacking: SX) -> SX:
 class HeldStatics:
     """Cables whose static start, and whose length shifts (n,), are symbols where they depend on others.
 
-    The start is the same all through a sample, and is not to be computed again with each of the rates.
+    The start is the same from one update of these to the next, and is not to be computed again with each of the rates.
     """
 
     cables: tuple[CableComponent, ...]
