@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
+import casadi
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -92,6 +93,26 @@ def test_slopes_beside_uncertain_anchors_are_the_derivatives_of_the_innovations(
     more, less = (likelihood.innovations(short, [mass]).values for mass in (1e-4, -1e-4))
     error = (more - less) / 2e-4 - slopes
     assert np.linalg.norm(error) < 0.03 * np.linalg.norm(slopes)
+
+
+def test_jacobians_of_the_rates_are_those_of_the_whole_model_beside_uncertain_anchors() -> None:
+    """The start's tensions depend on the anchors, and the rates on these."""
+    surveyed = replace(ROBOT, cables=tuple(replace(cable, anchor_uncertainty=3e-3) for cable in ROBOT.cables))
+    relaxing = EffectSetting("relaxation", {"modulus": 3e10, "time": 0.3}, (1, 2, 3))
+    likelihood = Likelihood(surveyed.with_effect(relaxing), (), NOISE, 0.02)
+    model, count = likelihood.model, len(likelihood.uncertain)
+    whole = casadi.Function("whole", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
+    start, _ = likelihood.start([])
+    state = start + np.append(np.zeros(len(start) - count), np.linspace(-1.0, 1.0, count))
+    expected = np.array(whole(state, np.append([0.1, -0.2, 0.05], np.zeros(3))))
+    jacobians = likelihood.rate_jacobians([], state[:, None], np.array([[0.1], [-0.2], [0.05]]))[0]
+    assert jacobians == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.max(np.abs(expected)))
+    assert np.any(expected[:, len(start) - count :])
+    functions, at_rest = likelihood._filter_functions, np.array(whole(start, np.zeros(6)))
+    assert len(functions.settling) == 3
+    settling = np.array(functions.settling_slopes([]))
+    assert settling == pytest.approx(at_rest[functions.settling], rel=1e-9, abs=1e-9 * np.max(np.abs(settling)))
+    assert np.any(settling[:, len(start) - count :])
 
 
 def test_noise_of_winch_speeds_reaches_tensions_alike_by_damping_and_by_relaxation_in_no_time() -> None:
