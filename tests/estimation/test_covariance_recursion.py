@@ -18,6 +18,7 @@ from tautwire.estimation.covariance_recursion import (
     Moments,
     Record,
     Samples,
+    empty_record,
     recursion_buffers,
     run_recursion,
 )
@@ -110,13 +111,7 @@ def step(function: BoundFunction) -> Step:
 def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
     """The moments after the last sample, and the record of a run."""
     moments = Moments(START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE)))
-    record = Record(
-        np.empty((COUNT + 1, SIZE)),
-        *np.zeros((2, COUNT * keeps_covariances, SIZE, SIZE)),
-        np.empty((COUNT * keeps_covariances, OUTPUTS, SIZE)),
-        *np.empty((2, COUNT, OUTPUTS)),
-        np.empty((COUNT, PARAMETERS, OUTPUTS)),
-    )
+    record = empty_record((COUNT, OUTPUTS, SIZE, PARAMETERS), keeps_covariances)
     outputs, integration, process, _owners = bound(COUNT, moments.state)
     samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
     buffers = recursion_buffers(OUTPUTS, SIZE, PARAMETERS, integration)

@@ -15,7 +15,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
-from .covariance_recursion import Functions, Moments, Record, Samples, recursion_buffers, run_recursion
+from .covariance_recursion import Functions, Moments, Samples, empty_record, recursion_buffers, run_recursion
 from .integration_steps import Substeps
 from .kalman_filter import (
     Noise,
@@ -80,6 +80,24 @@ class FilterResults:
     end: FilterState
 
 
+@dataclass(frozen=True)
+class _BoundFunctions:
+    """A filter's functions, bound to the inputs of a run and to what its loops change, ``moving`` to ``index``.
+
+    For these see :class:`tautwire.estimation.step_integration.Integration`.
+    """
+
+    static_start: BoundFunction
+    outputs: BoundFunction
+    preparation: BoundFunction
+    part: BoundFunction
+    slope: BoundFunction
+    process: BoundFunction
+    moving: Array
+    middle: Array
+    index: Array
+
+
 class CompiledFilter:
     """Filter of a model whose last ``constant_count`` states are uncertain parameters.
 
@@ -140,54 +158,18 @@ class CompiledFilter:
 
     def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:
         """Run over K samples."""
-        measured, observed, shift, speed, later, bends, step, drift, rotation = inputs.columns
-        output_count, count = measured.shape
-        state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
-        theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
-        first = self.model.states.numel() - self._constant_count
-        static_start = self.static_start.bind(count, theta, state[first : first + self._constant_count, None])
-        held = static_start.results[0].T
-        outputs = self.outputs.bind(count, state[:, None], theta, held, shift, speed, later, step, rotation)
-        preparation = self._preparation.bind(count, state[:, None], theta, held, step, inputs.disturbance)
-        constants, index = preparation.results[0], np.zeros((1, 1))
-        moving, middle = np.zeros((2, 1, first))
-        part = self._trajectory.bind(count, moving.T, constants.T, speed, later, bends, step, index)
-        slope = self._slopes.bind(count, middle.T, constants.T, speed, later, index)
-        process = self._process.bind(count, step, drift, density, inputs.disturbance)
-        parameter_rows = start.sensitivities.shape[1]
-        driving_count = preparation.results[1].shape[1]
-        slope_step, division = _step(slope), Division(*astuple(self._substeps))
-        integration = Integration(
-            _step(static_start),
-            self._constant_count,
-            _step(preparation),
-            _step(part),
-            slope_step,
-            division,
-            moving,
-            middle,
-            index,
-            np.ascontiguousarray(step[0]),
-            np.empty((self.model.states.numel() + driving_count, moving.shape[1])),
-            np.empty((parameter_rows, moving.shape[1])),
-            integration_buffers(slope_step, division),
-        )
+        moments = Moments(start.state.copy(), start.covariance.copy(), sensitivities)
+        measured, observed, *_, step, _, _ = inputs.columns
+        output_count, count = measured.shape
         size, parameter_count = start.sensitivities.shape
-        kept_count = count if keeps_covariances else 0
-        record = Record(
-            np.empty((count + 1, size)),
-            np.empty((kept_count, size, size)),
-            np.zeros((kept_count, size, size)),
-            np.empty((kept_count, output_count, size)),
-            np.empty((count, output_count)),
-            np.empty((count, output_count)),
-            np.empty((count, parameter_count, output_count)),
-        )
-        moments = Moments(state, covariance, sensitivities)
+        bound = self._bind(count, moments.state, inputs)
+        integration = self._integration(bound, np.ascontiguousarray(step[0]), parameter_count)
+        record = empty_record((count, output_count, size, parameter_count), keeps_covariances)
         samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
         buffers = recursion_buffers(output_count, size, parameter_count, integration)
-        run_recursion(Functions(_step(outputs), _step(process)), integration, moments, samples, record, buffers)
+        functions = Functions(_step(bound.outputs), _step(bound.process))
+        run_recursion(functions, integration, moments, samples, record, buffers)
         with np.errstate(invalid="ignore", divide="ignore"):
             log_variances = np.log(record.variances)
         return FilterResults(
@@ -198,7 +180,47 @@ class CompiledFilter:
             record.values,
             log_variances,
             record.sensitivities.swapaxes(1, 2),
-            FilterState(state, covariance, sensitivities.T),
+            FilterState(moments.state, moments.covariance, moments.sensitivities.T),
+        )
+
+    def _bind(self, count: int, state: Array, inputs: FilterInputs) -> _BoundFunctions:
+        _, _, shift, speed, later, bends, step, drift, rotation = inputs.columns
+        theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
+        first = self.model.states.numel() - self._constant_count
+        static_start = self.static_start.bind(count, theta, state[first : first + self._constant_count, None])
+        statics = static_start.results[0].T
+        preparation = self._preparation.bind(count, state[:, None], theta, statics, step, inputs.disturbance)
+        constants, index = preparation.results[0].T, np.zeros((1, 1))
+        moving, middle = np.zeros((2, 1, first))
+        return _BoundFunctions(
+            static_start,
+            self.outputs.bind(count, state[:, None], theta, statics, shift, speed, later, step, rotation),
+            preparation,
+            self._trajectory.bind(count, moving.T, constants, speed, later, bends, step, index),
+            self._slopes.bind(count, middle.T, constants, speed, later, index),
+            self._process.bind(count, step, drift, density, inputs.disturbance),
+            moving,
+            middle,
+            index,
+        )
+
+    def _integration(self, bound: _BoundFunctions, steps: Array, parameter_count: int) -> Integration:
+        slope, division, moving_count = _step(bound.slope), Division(*astuple(self._substeps)), bound.moving.shape[1]
+        driving_count = bound.preparation.results[1].shape[1]
+        return Integration(
+            _step(bound.static_start),
+            self._constant_count,
+            _step(bound.preparation),
+            _step(bound.part),
+            slope,
+            division,
+            bound.moving,
+            bound.middle,
+            bound.index,
+            steps,
+            np.empty((self.model.states.numel() + driving_count, moving_count)),
+            np.empty((parameter_count, moving_count)),
+            integration_buffers(slope, division),
         )
 
     @cached_property

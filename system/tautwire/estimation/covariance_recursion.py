@@ -108,6 +108,21 @@ class Buffers(NamedTuple):
     moved_sensitivities: Any
 
 
+def empty_record(sizes: tuple[int, int, int, int], keeps_covariances: bool) -> Record:
+    """A record for numbers of samples, outputs, states and parameters, to be filled in."""
+    count, m, n, p = sizes
+    kept = count if keeps_covariances else 0
+    return Record(
+        np.empty((count + 1, n)),
+        np.empty((kept, n, n)),
+        np.zeros((kept, n, n)),
+        np.empty((kept, m, n)),
+        np.empty((count, m)),
+        np.empty((count, m)),
+        np.empty((count, p, m)),
+    )
+
+
 def recursion_buffers(output_count: int, size: int, parameter_count: int, integration: Integration) -> Buffers:
     """Buffers for a number of outputs, states and parameters, and an integration."""
     m, n, p = output_count, size, parameter_count

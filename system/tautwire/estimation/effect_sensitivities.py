@@ -173,7 +173,7 @@ class EffectSensitivities:
     def _propagate_effect_states(self, run: LinearisedSegment, theta: Array, trial: int) -> tuple[Array, Array]:
         """The effect's states (z, K + 1) and their sensitivities (z, p x (K + 1)).
 
-        What is constant in a step, theta, has been updated at its begin and is predicted for its end.
+        In a step theta is what it is predicted to be at the end: it is updated at samples, before a step begins.
         """
         count, parameter_count = len(run.step), self._parameter_count
         if not self._effect_state_count:

@@ -135,29 +135,26 @@ def symbolic_model(
 
 @dataclass(frozen=True)
 class _DeclaredStart:
-    """The static start at the declared values of uncertain parameters: these, and its roots in place of others."""
+    """The static start at the declared values of uncertain parameters, where roots have unknowns of their own."""
 
     constants: SX
-    replaced_roots: tuple[ImplicitRoot, ...]
+    uncertain_roots: tuple[ImplicitRoot, ...]
     roots: tuple[ImplicitRoot, ...]
 
     @classmethod
     def of(cls, roots: tuple[ImplicitRoot, ...], constants: Sequence[SX]) -> _DeclaredStart:
         column = casadi.vertcat(SX(0, 1), *constants)
-        there = tuple(root.at(column, SX.zeros(column.shape)) for root in roots) if constants else ()
-        return cls(column, roots, there)
+        return cls(column, roots, tuple(root.at(column, SX.zeros(column.shape)) for root in roots))
 
     def expression(self, expression: SX) -> SX:
         """An expression at the declared values."""
-        if not self.constants.numel():
-            return expression
-        symbols = [self.constants, *(root.unknowns for root in self.replaced_roots)]
+        symbols = [self.constants, *(root.unknowns for root in self.uncertain_roots)]
         values = [SX.zeros(self.constants.shape), *(root.unknowns for root in self.roots)]
         return casadi.substitute([expression], symbols, values)[0]
 
     def values(self, expression: SX) -> SX:
         """The same by free parameters alone."""
-        return at_roots([self.expression(expression)], self.roots or self.replaced_roots)[0]
+        return at_roots([self.expression(expression)], self.roots)[0]
 
 
 def _with_static_values(equations: Equations, start: StaticStart) -> Equations:
@@ -188,7 +185,7 @@ def _initial_state(assembly: RobotAssembly, rotation: SX, effect_state_count: in
 def _length_shifts(assembly: RobotAssembly, declared: _DeclaredStart) -> SX:
     """How much longer the cables are at the start (n,) than at the declared values of the uncertain parameters."""
     lengths = casadi.vertcat(*(SX(component.constants.start_length) for component in assembly.cables))
-    uncertain = casadi.vertcat(declared.constants, *(root.unknowns for root in declared.replaced_roots))
+    uncertain = casadi.vertcat(declared.constants, *(root.unknowns for root in declared.uncertain_roots))
     if not declared.constants.numel() or not casadi.depends_on(lengths, uncertain):
         return SX(lengths.shape[0], 1)
     return lengths - declared.expression(lengths)
