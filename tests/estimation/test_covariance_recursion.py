@@ -49,6 +49,7 @@ NOISE_AT_END = np.diag(PROCESS_NOISE) - NOISE_AT_START
 FULL_TRANSITION = np.diag(DECAY)
 FULL_TRANSITION[:MOVING] = 0.0
 FULL_TRANSITION[:MOVING, :FROM] = TRANSITION
+NO_OFFSET = np.zeros(SIZE)
 START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0.1, 0.3])
 
 
@@ -108,9 +109,10 @@ def step(function: BoundFunction) -> Step:
     return Step(function.address, function.places.ctypes.data, function.strides.ctypes.data, function.results)
 
 
-def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
-    """The moments after the last sample, and the record of a run."""
-    moments = Moments(START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE)))
+def recursion(keeps_covariances: bool, prior_offset: np.ndarray = NO_OFFSET) -> tuple[Moments, Record]:
+    """The moments after the last sample, and the record of a run that is linearised away from the prior mean."""
+    sensitivities = np.zeros((PARAMETERS, SIZE))
+    moments = Moments(START - prior_offset, prior_offset, START_COVARIANCE.copy(), sensitivities)
     record = empty_record((COUNT, OUTPUTS, SIZE, PARAMETERS), keeps_covariances)
     outputs, integration, process, _owners = bound(COUNT, moments.state)
     samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
@@ -140,6 +142,14 @@ def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> No
     assert moments.state == pytest.approx(expected_state)
     assert moments.covariance == pytest.approx(expected_covariance)
     assert record.states[-1] == pytest.approx(expected_state)
+
+
+def test_of_a_linear_model_it_does_not_matter_where_the_first_sample_is_linearised() -> None:
+    offset = np.random.default_rng(2).normal(size=SIZE)
+    (moments, record), (there, elsewhere) = (recursion(False, each) for each in (NO_OFFSET, offset))
+    assert elsewhere.values == pytest.approx(record.values)
+    assert there.state == pytest.approx(moments.state)
+    assert elsewhere.states[0] == pytest.approx(record.states[0] - offset)
 
 
 def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> None:

@@ -187,7 +187,7 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
         size = len(begun)
         columns = (unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((0, 1)))
         inputs = FilterInputs(columns, np.zeros((0, 1)), np.zeros((0, 1)), np.ones(11), 0.0)
-        before = FilterState(begun.ravel(), np.eye(size), np.zeros((size, 0)))
+        before = FilterState(begun.ravel(), np.zeros(size), np.eye(size), np.zeros((size, 0)))
         return likelihood._filter_functions.run(before, inputs, keeps_covariances=True)
 
     transition = run(state).transitions[0]

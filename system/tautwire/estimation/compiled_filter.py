@@ -54,9 +54,13 @@ class FilterInputs:
 
 @dataclass(frozen=True)
 class FilterState:
-    """State (n,), covariance (n, n), and sensitivities (n, p) of a filter before a sample."""
+    """State (n,), covariance (n, n), and sensitivities (n, p) of a filter before a sample.
+
+    The sample's outputs are linearised at the state; its prior mean is ``prior_offset`` (n,) from there.
+    """
 
     state: Array
+    prior_offset: Array
     covariance: Array
     sensitivities: Array
 
@@ -67,10 +71,12 @@ class FilterResults:
 
     ``covariances`` of the former, ``transitions`` to the next sample (K, n, n) and ``output_matrices`` (K, m, n), none
     unless they are kept; ``values`` and ``log_variances`` (K, m), ``sensitivities`` (K, m, p); ``end`` is the state
-    after the last sample.
+    after the last sample. Outputs of the first one are linearised at its state, of which the prediction is
+    ``prior_offset`` (n,) away.
     """
 
     states: Array
+    prior_offset: Array
     covariances: Array
     transitions: Array
     output_matrices: Array
@@ -156,10 +162,22 @@ class CompiledFilter:
         model = constants_as_parameters(self.model, self._constant_count)
         return CompiledFilter(model, 0, self._cable_count, self._noise, self._substeps, has_sensitivities=False)
 
+    def first_outputs(self, state: Array, inputs: FilterInputs) -> tuple[Array, Array]:
+        """Expected outputs (m,) of the first sample, and their derivatives by the state (m, n)."""
+        _, _, shift, speed, later, _, step, _, rotation = (column[:, :1] for column in inputs.columns)
+        theta, end = inputs.parameters, self.model.states.numel()
+        constants = slice(end - self._constant_count, end)
+        statics, slopes = self.static_start(1, theta, state[constants, None])
+        arguments = (state[:, None], theta, statics, shift, speed, later, step, rotation)
+        expected, by_state, by_others = self.outputs(1, *arguments)
+        if self._has_sensitivities:
+            by_state[:, constants] += by_others[:, len(theta) :] @ slopes[:, len(theta) :]
+        return expected.ravel(), by_state
+
     def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:
         """Run over K samples."""
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
-        moments = Moments(start.state.copy(), start.covariance.copy(), sensitivities)
+        moments = Moments(start.state.copy(), start.prior_offset, start.covariance.copy(), sensitivities)
         measured, observed, *_, step, _, _ = inputs.columns
         output_count, count = measured.shape
         size, parameter_count = start.sensitivities.shape
@@ -174,13 +192,14 @@ class CompiledFilter:
             log_variances = np.log(record.variances)
         return FilterResults(
             record.states.T,
+            start.prior_offset,
             record.covariances,
             record.transitions,
             record.output_matrices,
             record.values,
             log_variances,
             record.sensitivities.swapaxes(1, 2),
-            FilterState(moments.state, moments.covariance, moments.sensitivities.T),
+            FilterState(moments.state, np.zeros(size), moments.covariance, moments.sensitivities.T),
         )
 
     def _bind(self, count: int, state: Array, inputs: FilterInputs) -> _BoundFunctions:

@@ -49,9 +49,13 @@ class Functions(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """Moments of the state, changed in place: ``state`` (n), ``covariance`` (n, n), ``sensitivities`` (p, n)."""
+    """Moments of the state, changed in place: ``state`` (n), ``covariance`` (n, n), ``sensitivities`` (p, n).
+
+    The first sample's outputs are linearised at the state; its mean is ``prior_offset`` (n) from there.
+    """
 
     state: Any
+    prior_offset: Any
     covariance: Any
     sensitivities: Any
 
@@ -151,6 +155,8 @@ def run_recursion(
         _add_slopes_of_statics(outputs.results, integration, buffers.through_statics)
         if len(record.output_matrices):
             assign_matrix(record.output_matrices[k], outputs.results[1].T)
+        if k == 0:
+            _move_to_prior_mean(outputs.results, moments)
         _update_by_measurements(outputs.results, moments, samples, record, buffers, k)
         integrate_step(integration, moments.state, k)
         evaluate(process, k)
@@ -174,6 +180,15 @@ def _add_slopes_of_statics(results: tuple[Any, ...], integration: Integration, t
         multiply(slopes, results[2][parameter_count:], through_statics)
         add_to_matrix(results[2][:parameter_count], 1.0, through_statics[:parameter_count])
         add_to_matrix(results[1][moving : moving + count], 1.0, through_statics[parameter_count:])
+
+
+@compiled
+def _move_to_prior_mean(results: tuple[Any, ...], moments: Moments) -> None:
+    """Move the state, and what is expected of it, from where it was linearised to its mean."""
+    for j in range(len(moments.state)):
+        moments.state[j] += moments.prior_offset[j]
+        for i in range(results[1].shape[1]):
+            results[0][0, i] += results[1][j, i] * moments.prior_offset[j]
 
 
 @compiled

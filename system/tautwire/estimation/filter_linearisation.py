@@ -31,9 +31,9 @@ MIN_RELATIVE_EIGENVALUE = 1e-12
 class LinearisedSegment:
     """Linearised filter segment: K successive samples of a run.
 
-    ``states`` (n, K + 1) as predicted, their unstrained lengths the true ones where others were recorded; winch
-    ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and ``shift`` (m, K) in s; ``rotation`` (3, K) as
-    measured, empty for a point mass. ``transition`` A
+    ``states`` (n, K + 1) as predicted, a run's first where its outputs are linearised; their unstrained lengths are the
+    true ones where others were recorded; winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
+    ``shift`` (m, K) in s; ``rotation`` (3, K) as measured, empty for a point mass. ``transition`` A
     (K, n, n), ``half_transition`` the same from half a step before the next sample, ``output_matrix`` C (K, m, n),
     ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit variance and is zero where
     nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain`` have the states of a disturbance
@@ -95,7 +95,8 @@ def linearise_filter(
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
         _, observed, shift, speed, later, _, step, _, rotation = segment.columns
-        results, predicted = segment.results, segment.results.states[:, :-1]
+        results, predicted = segment.results, segment.results.states[:, :-1].copy()
+        predicted[:, 0] += results.prior_offset
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], results.values, 0.0)
         output_matrix = results.output_matrices

@@ -12,11 +12,13 @@ from ..errors import RecordingError
 from ..recordings.recording import Recording
 from ..recordings.start_position import start_position, with_start
 from ..robot.cable_routes import unit_directions
+from ..robot.equilibrium_slopes import equilibrium_slopes
 from ..robot.kinematics import structure_matrix
 from ..robot.platform_symbols import StateIndices
-from ..robot.rigid_equilibrium import platform_size
+from ..robot.rigid_equilibrium import leaves_orientation_to_equilibrium, platform_size
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import start_orientation, static_tensions
+from ..robot.uncertain_parameters import uncertain_parameters
 from .kalman_filter import Noise
 from .measured_outputs import measured_outputs
 from .measurement_noise import rotation_scale
@@ -26,13 +28,16 @@ from .preprocessing_policy import InitialStatePolicy
 Array = NDArray[np.float64]
 
 RANK_TOLERANCE = 1e-9
+# Of a static tension on too few cables to hold any orientation: what bends beyond its slopes by uncertain parameters.
+START_TENSION_RATIO = 0.25
 
 
 def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_count: int = 0) -> Array:
     """Prior covariance (state_count, state_count) of the initial state.
 
     Beside pose, twist and lengths only the last ``constant_count`` states are uncertain; internal states of ropes
-    follow by :func:`settled_covariance`.
+    follow by :func:`settled_covariance`. Where an orientation follows from equilibrium, rotation and lengths are as
+    uncertain as the robot file's numbers make them there, independently of these: it bends too much with them.
 
     Self-stress, the tensions in the null space of redundant robots' structure matrix, has the standard deviation
     ``noise.self_stress``: with ``U`` the ropes' directions and ``F = l / (E S)``, unstrained lengths by
@@ -50,6 +55,23 @@ def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_co
     if noise.self_stress > 0.0:
         length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
         covariance[lengths, lengths] += noise.self_stress**2 * length_modes @ length_modes.T
+    if has_uncertain_equilibrium(robot):
+        rows = [*range(3, 6), *range(lengths.start, lengths.stop)]
+        covariance[np.ix_(rows, rows)] += _equilibrium_covariance(robot)
+    return covariance
+
+
+def has_uncertain_equilibrium(robot: Robot) -> bool:
+    """Whether the orientation at the start follows from an equilibrium, and that from uncertain numbers."""
+    return leaves_orientation_to_equilibrium(robot) and bool(uncertain_parameters(robot))
+
+
+def _equilibrium_covariance(robot: Robot) -> Array:
+    """Covariance (3 + n, 3 + n) of rotation and unstrained lengths in such an equilibrium."""
+    slopes = equilibrium_slopes(robot)
+    covariance: Array = slopes @ slopes.T
+    stretches = START_TENSION_RATIO * _cable_compliances(robot) * static_tensions(robot)
+    covariance[3:, 3:] += np.diag(stretches**2)
     return covariance
 
 

@@ -26,9 +26,10 @@ from ..robot.uncertain_parameters import uncertain_parameters
 from .compiled_filter import CompiledFilter, FilterInputs, FilterState
 from .disturbance import Disturbance
 from .filter_columns import align_delayed_outputs, filter_columns, unaligned_samples
-from .initial_state_prior import initial_covariance, settled_covariance
+from .initial_state_prior import has_uncertain_equilibrium, initial_covariance, settled_covariance
 from .innovations import FilterSegment, Innovations, concatenated
 from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBANCE, substeps_of_robot
+from .iterated_update import with_iterated_update
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
 from .measurement_model import output_count, rotation_count
@@ -232,7 +233,7 @@ class Likelihood:
         columns, is_recorded = filter_columns(recording, *outputs, rotation_count(self.model))
         theta = self.arguments(parameters)
         state, sensitivities = self._start(theta)
-        now = FilterState(state.ravel(), start_covariance, sensitivities)
+        now = FilterState(state.ravel(), np.zeros(len(state)), start_covariance, sensitivities)
         length = SEGMENT_SAMPLES_WITH_COVARIANCES if keeps_covariances else SEGMENT_SAMPLES
         for begin in range(0, len(is_recorded), length):
             self.poll_interrupts()
@@ -244,6 +245,8 @@ class Likelihood:
                 self.noise.white_variances(self.cable_count),
                 acceleration_noise_density,
             )
+            if begin == 0 and has_uncertain_equilibrium(self.robot):
+                now = with_iterated_update(self._filter_functions, inputs, now)
             results = self._filter_functions.run(now, inputs, keeps_covariances)
             yield FilterSegment(of_segment, is_recorded[begin : begin + length], results)
             now = results.end

@@ -61,6 +61,11 @@ class StaticEquilibrium:
     residual_force: float
 
 
+def leaves_orientation_to_equilibrium(robot: Robot) -> bool:
+    """Whether a robot's platform turns, on too few cables to be held in any orientation."""
+    return robot.platform.is_rigid_body and robot.cable_count < FREEDOMS
+
+
 def static_equilibrium(
     robot: Robot,
     position: Sequence[float] | Array | None = None,

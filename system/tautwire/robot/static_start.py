@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import casadi
 import numpy as np
@@ -39,13 +39,6 @@ class ImplicitRoot:
         by_unknowns, by_symbols = (casadi.jacobian(self.equations, each) for each in (self.unknowns, symbols))
         near_identity = casadi.mtimes(SX(self.inverse), by_unknowns) + SX(np.eye(len(self.projector)) - self.projector)
         return -casadi.solve(near_identity, casadi.mtimes(SX(self.inverse), by_symbols))
-
-    def at(self, symbols: SX, values: SX) -> ImplicitRoot:
-        """The root where some parameters have other values, with unknowns of its own."""
-        unknowns = SX.sym("unknowns_there", self.unknowns.numel())
-        (root,) = casadi.substitute([self.values], [symbols], [values])
-        (equations,) = casadi.substitute([self.equations], [self.unknowns, symbols], [unknowns, values])
-        return replace(self, unknowns=unknowns, values=root, equations=equations)
 
 
 @dataclass(frozen=True)

@@ -16,12 +16,13 @@ from tautwire_fmu.laws.rotation import Quaternion
 from .active_effects import platform_axes
 from .measured_start import with_true_start
 from .platform_symbols import StateIndices, platform_symbols
+from .rigid_equilibrium import leaves_orientation_to_equilibrium
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import EffectSetting, Robot
 from .static_equilibrium import start_orientation
-from .static_start import ImplicitRoot, StaticStart, at_roots
+from .static_start import StaticStart, at_roots
 from .symbolic_equations import CASADI_MATHEMATICS, Equations, MechanicalVariables, minimal_equations
-from .symbolic_statics import held_statics, symbolic_statics
+from .symbolic_statics import SymbolicStatics, held_statics, symbolic_statics
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 # Instead of an effect's index: a parameter of the formulas.
@@ -82,29 +83,34 @@ def symbolic_model(
 
     Each of ``uncertain_parameters`` is one more state, after all others: in standard deviations, zero at the start.
     The static start follows the free parameters; with more cables than degrees of freedom, cables at a tension limit
-    stay there. Not valid across a change of which cables are at a limit. Rotations of a rigid body count from the
-    ``reference_orientation``, by default that of the start.
+    stay there. It follows uncertain parameters too, but not where an orientation follows from equilibrium: that bends
+    too much with them, and is a state that a filter does not know at first. Not valid across a change of which cables
+    are at a limit. Rotations of a rigid body count from the ``reference_orientation``, by default that of the start.
     """
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
     constants = [SX.sym(number.label) for number in uncertain_parameters]
     perturbations = [limited_perturbation(constant, casadi.sqrt) for constant in constants]
     perturbed = perturbed_robot(robot, uncertain_parameters, perturbations)
-    symbolic_robot = with_true_start(_with_symbols(perturbed, free_parameters, symbols), CASADI_MATHEMATICS)
+    symbolic_robot, declared = (
+        with_true_start(_with_symbols(each, free_parameters, symbols), CASADI_MATHEMATICS)
+        for each in (perturbed, robot)
+    )
     nominal = with_true_start(robot)
+    at_start = declared if leaves_orientation_to_equilibrium(robot) else symbolic_robot
     reference = start_orientation(nominal) if reference_orientation is None else reference_orientation
-    statics = symbolic_statics(nominal, symbolic_robot, reference, CASADI_MATHEMATICS)
-    assembly = assemble_robot(symbolic_robot, statics.tensions, CASADI_MATHEMATICS, statics.orientation)
+    statics = symbolic_statics(nominal, at_start, reference, CASADI_MATHEMATICS)
+    assembly = _assembly(symbolic_robot, at_start, statics)
     count = len(assembly.cables)
     axes = platform_axes(robot.platform) if robot.platform.is_rigid_body else None
     platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference, axes)
-    declared = _DeclaredStart.of(statics.roots, constants)
-    shifts = _length_shifts(assembly, declared)
-    held = held_statics(assembly.cables, shifts, [*symbols, *constants], (*statics.roots, *declared.roots))
+    shifts = _length_shifts(assembly, constants)
+    held = held_statics(assembly.cables, shifts, [*symbols, *constants], statics.roots)
     lengths, winch_speeds = SX.sym("unstrained_length", count), SX.sym("winch_speed", count)
     variables = MechanicalVariables(platform, lengths, winch_speeds, held.length_shifts)
     effect_states, equations = minimal_equations(replace(assembly, cables=held.cables), variables)
     by_statics, equations = equations, _with_static_values(equations, held.start)
-    start = declared.values(_initial_state(assembly, statics.rotation, len(effect_states)))
+    start = _at_declared(_initial_state(assembly, statics.rotation, len(effect_states)), constants)
+    (start,) = at_roots([start], statics.roots)
     no_rates, indices = SX(len(constants), 1), StateIndices(platform.pose.numel(), count)
     first_effect_state = variables.states.numel()
     errors = sensor_errors(uncertain_parameters, perturbations, count)
@@ -133,28 +139,30 @@ def symbolic_model(
     )
 
 
-@dataclass(frozen=True)
-class _DeclaredStart:
-    """The static start at the declared values of uncertain parameters, where roots have unknowns of their own."""
+def _assembly(robot: Robot, at_start: Robot, statics: SymbolicStatics) -> RobotAssembly:
+    """The assembly of a robot whose cables have their start from another one."""
+    assembly, started = (
+        assemble_robot(each, statics.tensions, CASADI_MATHEMATICS, statics.orientation) for each in (robot, at_start)
+    )
+    cables = [
+        replace(
+            component,
+            constants=component.constants._replace(
+                start_length=start.start_length,
+                start_tension=start.start_tension,
+                start_direction=start.start_direction,
+                start_cell_tension=start.start_cell_tension,
+            ),
+        )
+        for component, start in zip(assembly.cables, (each.constants for each in started.cables), strict=True)
+    ]
+    return replace(assembly, cables=tuple(cables))
 
-    constants: SX
-    uncertain_roots: tuple[ImplicitRoot, ...]
-    roots: tuple[ImplicitRoot, ...]
 
-    @classmethod
-    def of(cls, roots: tuple[ImplicitRoot, ...], constants: Sequence[SX]) -> _DeclaredStart:
-        column = casadi.vertcat(SX(0, 1), *constants)
-        return cls(column, roots, tuple(root.at(column, SX.zeros(column.shape)) for root in roots))
-
-    def expression(self, expression: SX) -> SX:
-        """An expression at the declared values."""
-        symbols = [self.constants, *(root.unknowns for root in self.uncertain_roots)]
-        values = [SX.zeros(self.constants.shape), *(root.unknowns for root in self.roots)]
-        return casadi.substitute([expression], symbols, values)[0]
-
-    def values(self, expression: SX) -> SX:
-        """The same by free parameters alone."""
-        return at_roots([self.expression(expression)], self.roots)[0]
+def _at_declared(expression: SX, constants: Sequence[SX]) -> SX:
+    """An expression at the declared values of uncertain parameters."""
+    column = casadi.vertcat(SX(0, 1), *constants)
+    return casadi.substitute([expression], [column], [SX.zeros(column.shape)])[0]
 
 
 def _with_static_values(equations: Equations, start: StaticStart) -> Equations:
@@ -182,13 +190,12 @@ def _initial_state(assembly: RobotAssembly, rotation: SX, effect_state_count: in
     return casadi.vertcat(motion, *lengths, SX(effect_state_count, 1))
 
 
-def _length_shifts(assembly: RobotAssembly, declared: _DeclaredStart) -> SX:
+def _length_shifts(assembly: RobotAssembly, constants: Sequence[SX]) -> SX:
     """How much longer the cables are at the start (n,) than at the declared values of the uncertain parameters."""
     lengths = casadi.vertcat(*(SX(component.constants.start_length) for component in assembly.cables))
-    uncertain = casadi.vertcat(declared.constants, *(root.unknowns for root in declared.uncertain_roots))
-    if not declared.constants.numel() or not casadi.depends_on(lengths, uncertain):
+    if not constants or not casadi.depends_on(lengths, casadi.vertcat(*constants)):
         return SX(lengths.shape[0], 1)
-    return lengths - declared.expression(lengths)
+    return lengths - _at_declared(lengths, constants)
 
 
 def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
