@@ -433,6 +433,8 @@ QUATERNIONS = {
     "a message": ([f"pose.orientation.{part}" for part in "wxyz"], ""),
     "a body": ([f"Rigid Body 1 Rotation {part}" for part in "WXYZ"], ""),
     "numbered words": ([f"platform_quaternion{part}" for part in range(4)], "numbered from 0"),
+    "an order from 0": ([f"tr_xyzw[{part}]" for part in (3, 0, 1, 2)], ""),
+    "an order from 1": ([f"rot_wxyz_{part}" for part in (1, 2, 3, 4)], ""),
 }
 
 
@@ -448,6 +450,40 @@ def test_the_parts_of_a_quaternion_are_proposed(name: str, tmp_path: Path) -> No
     )
     assert all(each.doubt.startswith(doubt) and not each.unit for each in told.values())
     assert all(bool(each.doubt) == bool(doubt) for each in told.values())
+
+
+@pytest.mark.parametrize("names", [["w1_rpm", "w2_rpm", "w3_rpm"], ["w_rpm[0]", "w_rpm[1]", "w_rpm[2]"]])
+def test_a_unit_that_only_speeds_or_forces_have_tells_them_where_no_word_does(names: list[str], tmp_path: Path) -> None:
+    frame = standard().rename(columns={f"winch_speed_{cable}": name for cable, name in enumerate(names, start=1)})
+    forces = [f"S{cable} [kN]" for cable in (1, 2, 3)]
+    frame.rename(columns={f"tension_{cable}": name for cable, name in enumerate(forces, start=1)}).to_csv(
+        tmp_path / "log.csv", index=False
+    )
+    told = {each.column: each for each in propose_columns(column_names(tmp_path / "log.csv"), 3).columns}
+    assert [told[f"winch_speed_{cable}"].name for cable in (1, 2, 3)] == names
+    assert [(told[f"tension_{cable}"].name, told[f"tension_{cable}"].unit) for cable in (1, 2, 3)] == [
+        (name, "kN") for name in forces
+    ]
+    assert "radius * pi / 30; quantity not named" in told["winch_speed_1"].doubt
+
+
+@pytest.mark.parametrize(
+    ("names", "are_coordinates"),
+    [
+        (["tracker_pos[0]", "tracker_pos[1]", "tracker_pos[2]"], True),
+        (["tcp.1", "tcp.2", "tcp.3"], True),
+        (["pos_1", "pos_2", "pos_3"], False),
+        (["marker_1", "marker_2", "marker_3", "marker_4"], False),
+    ],
+)
+def test_numbered_coordinates_are_those_of_a_tracked_point(
+    names: list[str], are_coordinates: bool, tmp_path: Path
+) -> None:
+    frame = standard().drop(columns=["x", "y", "z"]).assign(**dict.fromkeys(names, 1.0))
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    told = {each.column: each.name for each in propose_columns(column_names(tmp_path / "log.csv"), 3).columns}
+    assert ([told.get(axis) for axis in "xyz"] == names[:3]) == are_coordinates
+    assert are_coordinates or not {"x", "y", "z"} & told.keys()
 
 
 @pytest.mark.parametrize(
