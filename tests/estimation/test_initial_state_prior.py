@@ -10,6 +10,7 @@ from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
+from tautwire.robot.equilibrium_slopes import equilibrium_slopes
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.robot_file_writer import write_robot
@@ -18,6 +19,7 @@ from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.symbolic_model import symbolic_model
 from tautwire_fmu.laws.effects.relaxation import RELAXATION
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import underactuated_robot
 from tests.support.robots import example
 
 THREE, EIGHT = example("three"), example("eight")
@@ -71,6 +73,21 @@ def test_relaxed_ropes_have_relaxed_under_the_pretension_that_they_have() -> Non
     relaxing_rates = np.array(casadi.evalf(slopes))[branches] @ np.linalg.cholesky(covariance + 1e-18 * np.eye(22))
     lengths = np.sqrt(np.diag(covariance)[6:14])
     assert np.abs(relaxing_rates).max() < 1e-3 * lengths.min() / 0.4
+
+
+def test_a_start_in_an_equilibrium_of_uncertain_numbers_is_as_uncertain_as_these_make_it() -> None:
+    """Of rotation and lengths; to lengths a quarter of each tension is added."""
+    robot, noise = underactuated_robot(), Noise(1e-4, 1.0, 1e-5, 1e-4, rotation=1e-4, start_rotation=1e-3)
+    known = initial_covariance(robot, noise, 16)
+    platform = replace(robot.platform, centre_of_mass_uncertainty=0.01)
+    uncertain = replace(robot, platform=platform)
+    added = (initial_covariance(uncertain, noise, 16) - known)[np.ix_([3, 4, 5, 12, 13, 14, 15], range(16))]
+    slopes = equilibrium_slopes(uncertain)
+    lengths = np.linalg.norm(np.subtract(robot.anchors, robot.platform.start), axis=1)
+    stretches = 0.25 * static_tensions(robot) * lengths / [cable.modulus * cable.area for cable in robot.cables]
+    expected = slopes @ slopes.T + np.diag([0.0, 0.0, 0.0, *stretches**2])
+    assert added[:, [3, 4, 5, 12, 13, 14, 15]] == pytest.approx(expected, abs=1e-15)
+    assert not np.any(added[:, [0, 1, 2, *range(6, 12)]])
 
 
 @pytest.mark.validate

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.compiled_filter import FilterInputs
+from tautwire.estimation.filter_linearisation import linearise_filter
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
@@ -49,6 +50,23 @@ def test_innovations_have_unit_variance_from_the_first_sample_where_numbers_are_
         values = innovations.values[rows]
         assert np.mean(values**2) == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / values.size))
     assert np.max(np.abs(innovations.constants)) < 4.0
+
+
+def test_of_sensors_without_noise_that_see_what_is_known_exactly_the_prior_stays() -> None:
+    recording = draw(5)
+    exact = replace(estimate_noise(DECLARED, recording), position=0.0, start_position=0.0)
+    first = next(Likelihood(DECLARED, (), exact, 0.01).segments(recording, ()))
+    assert not np.any(first.results.prior_offset)
+
+
+def test_a_run_is_linearised_about_the_state_after_its_first_update_too() -> None:
+    recording = draw(6)
+    likelihood = likelihood_of(recording)
+    first = next(linearise_filter(likelihood, [], recording))
+    (rate_jacobian,) = likelihood.rate_jacobians([], first.states[:, :1], first.speeds[:, :1])
+    transition = first.transition[0]
+    ahead = first.step[0] / 8.0 * (np.eye(len(transition)) - transition) @ rate_jacobian
+    assert first.half_transition[0] == pytest.approx(0.5 * (transition + np.eye(len(transition))) + ahead, abs=1e-9)
 
 
 def test_the_first_sample_is_linearised_at_the_maximum_of_its_posterior_density() -> None:

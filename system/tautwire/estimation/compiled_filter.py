@@ -163,15 +163,12 @@ class CompiledFilter:
         return CompiledFilter(model, 0, self._cable_count, self._noise, self._substeps, has_sensitivities=False)
 
     def first_outputs(self, state: Array, inputs: FilterInputs) -> tuple[Array, Array]:
-        """Expected outputs (m,) of the first sample, and their derivatives by the state (m, n)."""
+        """Expected outputs (m,) of the first sample, and their slopes by the state (m, n), the static start held."""
         _, _, shift, speed, later, _, step, _, rotation = (column[:, :1] for column in inputs.columns)
         theta, end = inputs.parameters, self.model.states.numel()
-        constants = slice(end - self._constant_count, end)
-        statics, slopes = self.static_start(1, theta, state[constants, None])
+        statics, _ = self.static_start(1, theta, state[end - self._constant_count : end, None])
         arguments = (state[:, None], theta, statics, shift, speed, later, step, rotation)
-        expected, by_state, by_others = self.outputs(1, *arguments)
-        if self._has_sensitivities:
-            by_state[:, constants] += by_others[:, len(theta) :] @ slopes[:, len(theta) :]
+        expected, by_state, _ = self.outputs(1, *arguments)
         return expected.ravel(), by_state
 
     def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:

@@ -23,7 +23,8 @@ from .compiled_filter import CompiledFilter, FilterInputs, FilterState
 
 Array = NDArray[np.float64]
 
-MAX_STEPS = 50
+# Four are usual; at a kink, where a rope goes slack, they end beside it.
+MAX_STEPS = 10
 # Prior standard deviations, of the step after which none follows.
 STEP_TOLERANCE = 1e-9
 
@@ -31,29 +32,30 @@ STEP_TOLERANCE = 1e-9
 def with_iterated_update(functions: CompiledFilter, inputs: FilterInputs, prior: FilterState) -> FilterState:
     """The prior with its state where the first sample's outputs are to be linearised.
 
-    They are linear in the states of a disturbance, which stay. The prior as it is where the steps do not converge.
+    They are linear in the states of a disturbance, which stay. The prior as it is where a step leads nowhere.
     """
     size = functions.model.states.numel()
-    state, last, damping = prior.state.copy(), np.inf, 1.0
-    deviations = np.sqrt(np.diag(prior.covariance)[:size])
+    state, deviations = prior.state.copy(), np.sqrt(np.diag(prior.covariance)[:size])
+    is_uncertain = deviations > 0.0
     for _ in range(MAX_STEPS):
         step = (_updated(functions, inputs, prior, state) - state)[:size]
-        length = float(np.max(np.abs(step[deviations > 0.0]) / deviations[deviations > 0.0], initial=0.0))
-        if not np.isfinite(length):
+        if not np.all(np.isfinite(step)):
             return prior
-        if length < STEP_TOLERANCE:
-            return replace(prior, state=state, prior_offset=prior.state - state)
-        damping, last = damping if length < last else 0.5 * damping, length
-        state[:size] += damping * step
-    return prior
+        state[:size] += step
+        if np.all(np.abs(step[is_uncertain]) < STEP_TOLERANCE * deviations[is_uncertain]):
+            break
+    return replace(prior, state=state, prior_offset=prior.state - state)
 
 
 def _updated(functions: CompiledFilter, inputs: FilterInputs, prior: FilterState, state: Array) -> Array:
-    """The state after an update with outputs linearised at another one."""
+    """The state after an update with outputs linearised at another one; NaN where an exact output is predicted so."""
     is_observed = inputs.columns[1][:, 0] > 0.0
     expected, by_state = (each[is_observed] for each in functions.first_outputs(state, inputs))
     error = inputs.columns[0][is_observed, 0] - expected - by_state @ (prior.state - state)
     cross = prior.covariance @ by_state.T
     variances = by_state @ cross + np.diag(inputs.white_variances[is_observed])
-    updated: Array = prior.state + cross @ np.linalg.solve(variances, error)
+    try:
+        updated: Array = prior.state + cross @ np.linalg.solve(variances, error)
+    except np.linalg.LinAlgError:
+        return np.full(len(prior.state), np.nan)
     return updated
