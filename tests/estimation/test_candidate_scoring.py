@@ -81,6 +81,46 @@ def test_candidates_get_own_disturbances_unless_fit_and_check_agree_on_the_best_
 
 
 @pytest.mark.parametrize(
+    ("evidence", "misses_much", "refit_evidence", "is_better"),
+    [(3.0, True, 900.0, True), (3.0, True, 2.0, False), (1000.0, True, 1100.0, False), (3.0, False, 900.0, False)],
+)
+def test_what_is_likeliest_beside_a_small_disturbance_is_fitted_beside_it_if_nothing_else_explains_what_is_missed(
+    evidence: float, misses_much: bool, refit_evidence: float, is_better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = of_one_recording()
+    robot, names = context.robot, ("drum", "payload", "drag")
+    large = replace(disturbance_prior(robot, context.fitter.noise).median, force=OrnsteinUhlenbeck(100.0, 0.05))
+    context = replace(context, fitter=context.fitter.with_disturbance(large))
+    drum, payload, drag = (Hypothesis(BY_NAME[name], (1, 2, 3) if name == "drum" else ()) for name in names)
+    ratios = [replace(drum.setting(robot), values={"radius_ratio": ratio}) for ratio in (1.01, 1.05)]
+    starts = {h: (robot.with_effect(h.setting(robot)),) for h in (payload, drag)}
+    starts[drum] = tuple(robot.with_effect(setting) for setting in ratios)
+    scores = {
+        h: CandidateScore(h, Fit.without_parameters(robots[0]), evidence, 1.0, explained=7.0)
+        for h, robots in starts.items()
+    }
+    likelihoods = {starts[drum][1]: 500.0, starts[payload][0]: 400.0}
+    tried: list[tuple[Robot, bool]] = []
+
+    def log_likelihood(fitter: Fitter, robot: Robot, *_: object) -> float:
+        assert fitter.noise.disturbance == disturbance_prior(robot, fitter.noise).median
+        return likelihoods.get(robot, 300.0)
+
+    def fitted(beside: IdentificationContext, _: str, tasks: dict[Hypothesis, FitTask], *__: object) -> object:
+        tried.extend((task.starts[0], beside.fitter.noise.disturbance == large) for task in tasks.values())
+        return {h: replace(scores[h], evidence=refit_evidence, explained=8.0) for h in tasks}
+
+    monkeypatch.setattr(candidate_scoring, "_misses_much", lambda _: misses_much)
+    monkeypatch.setattr(candidate_scoring, "finite_log_likelihood", log_likelihood)
+    monkeypatch.setattr(candidate_scoring, "fit_candidates", fitted)
+    refits = candidate_scoring._refitted_beside_small_disturbance(context, "round 1", starts, scores, 0.0)
+    better = {h: replace(scores[h], evidence=refit_evidence) for h in (drum, payload)}
+    assert refits == (better if is_better else {})
+    is_tried = evidence < 1000.0 and misses_much
+    assert tried == ([(starts[drum][1], False), (starts[payload][0], False)] if is_tried else [])
+
+
+@pytest.mark.parametrize(
     ("is_astray", "refit_evidence", "is_replaced"),
     [(True, 900.0, True), (True, 700.0, False), (False, 900.0, False)],
 )

@@ -59,6 +59,15 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
     return ValidatedFit(fit, log_likelihood, mean_square, explained) if np.isfinite(log_likelihood) else None
 
 
+def finite_log_likelihood(fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], data: DataSet) -> float:
+    """Log-likelihood of some data; minus infinity where the cables cannot hold the platform, or it is not finite."""
+    try:
+        value = fitter.log_likelihood(robot, chosen, data)
+    except UnreachableError:
+        return -inf
+    return value if isfinite(value) else -inf
+
+
 def fit_at_another_optimum(fitter: Fitter, task: FitTask, data: DataSet, policy: SelectionPolicy) -> Robot | None:
     """The robot at a better local optimum than the task's first start, which was fitted; None where there is none.
 
@@ -70,19 +79,12 @@ def fit_at_another_optimum(fitter: Fitter, task: FitTask, data: DataSet, policy:
     median = disturbance_prior(fitted, fitter.noise, fitter.policy.disturbance).median
     under_median = fitter.with_disturbance(median)
 
-    def log_likelihood(under: Fitter, robot: Robot) -> float:
-        try:
-            value = under.log_likelihood(robot, chosen, data)
-        except UnreachableError:
-            return -inf
-        return value if isfinite(value) else -inf
-
     def improved_log_likelihood(robot: Robot) -> float:
         improved = (with_improved_disturbance(under, robot, chosen, data) for under in (fitter, under_median))
-        return max(log_likelihood(under, robot) for under in improved)
+        return max(finite_log_likelihood(under, robot, chosen, data) for under in improved)
 
     def best_of(robots: Iterable[Robot]) -> Robot:
-        return max(robots, key=lambda robot: log_likelihood(under_median, robot))
+        return max(robots, key=lambda robot: finite_log_likelihood(under_median, robot, chosen, data))
 
     optima = []
     for starts in (task.starts, *starts_by_shape(fitted, chosen[-1])):
