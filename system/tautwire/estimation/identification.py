@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import ArgumentError, NumericalError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
-from ..recordings.recording_notes import kinematic_scale_notes
+from ..recordings.recording_notes import drift_notes, kinematic_scale_notes
 from ..recordings.shared_samples import require_unseen
 from ..robot.schema import Robot, validate_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
@@ -241,11 +241,15 @@ def _disturbance_notes(state: Identification) -> list[str]:
 
 
 def _kinematic_notes(state: Identification) -> list[str]:
-    """Notes on each winch's scale, where a drum that differs is named: its one value may stand for several."""
-    if "drum" not in [each.name for each in (*state.effects, *state.small_effects)]:
-        return []
+    """Notes on each winch's scale, where a drum that differs is named, and on its drift where a rope that creeps is.
+
+    A drum's one value may stand for several, and creep for a speed that is off by a constant.
+    """
+    names = {each.name for each in (*state.effects, *state.small_effects)}
+    told = [kinematic_scale_notes] if "drum" in names else []
+    told += [drift_notes] if names & {"creep", "thermal", "drum"} else []
     robot, data_sets = state.context.robot, state.prepared.data_sets
-    return [note for data in data_sets for note in kinematic_scale_notes(robot, data.recording)]
+    return [note for notes in told for data in data_sets for note in notes(robot, data.recording)]
 
 
 def _interval_notes(effects: Sequence[FoundEffect]) -> list[str]:

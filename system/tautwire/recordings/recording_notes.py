@@ -13,6 +13,7 @@ from .motion_regression import length_regression
 from .position_lag import PositionLag, position_lag
 from .recording import Recording
 from .unwound_motion import unwound_motion_text
+from .winch_drift import winch_drifts
 from .winch_scales import WinchScale, winch_scales
 
 # Of lifelike recordings the ropes' motion and the winch travel differ by less.
@@ -24,13 +25,14 @@ MAX_CLOCK_SPREAD = 0.015
 def recording_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
     """Notes on a lag of the positions, the scale of each winch and that of all load cells, which effects explain.
 
-    Where neither lag nor scales are told, one on winch travel and poses that differ by more than effects usually make
-    them, for whatever cause. Robots that declare effects of the kind are not judged.
+    Where neither lag nor scales are told, on winches that drift; without any of these, on winch travel and poses that
+    differ by more than effects usually make them. Robots that declare effects of the kind are not judged.
     """
     declared = {setting.name for setting in robot.effects}
     lag, scales = _lag_and_scales(robot, recording)
     notes = [_lag_text(lag)] if lag else []
     notes += [f"{_scales_text(scales)}: {_drums_text(recording, scales)}"] if scales else []
+    notes += [] if notes else _drift_texts(robot, recording)
     if not (notes or declared & EFFECTS_ON_POSES):
         unwound = unwound_motion_text(robot, recording)
         notes += [unwound] if unwound else _unexplained_travel(robot, recording)
@@ -47,6 +49,11 @@ def kinematic_scale_notes(robot: Robot, recording: Recording) -> tuple[str, ...]
     """
     scales = kinematic_scales(robot, recording)
     return (f"{recording.path}: by kinematics alone {_scales_text(scales)}",) if scales else ()
+
+
+def drift_notes(robot: Robot, recording: Recording) -> tuple[str, ...]:
+    """Notes on winches that drift, to stand beside what a trace says of ropes that lengthen by themselves."""
+    return tuple(f"{recording.path}: {text}" for text in _drift_texts(robot, recording))
 
 
 def kinematic_scales(robot: Robot, recording: Recording) -> tuple[WinchScale, ...]:
@@ -82,6 +89,17 @@ def _scales_text(scales: tuple[WinchScale, ...]) -> str:
     several = f"winches {', '.join(map(str, cables[:-1]))} and {cables[-1]}"
     winches = f"winch {cables[0]}" if len(cables) == 1 else several
     return f"rope moves {factors} (+- {max(deviation, 1e-3):.1g}) of what {winches} wound"
+
+
+def _drift_texts(robot: Robot, recording: Recording) -> list[str]:
+    if {setting.name for setting in robot.effects} & EFFECTS_ON_POSES:
+        return []
+    return [
+        f"rope {drift.cable} {'lengthens' if drift.rate > 0.0 else 'shortens'} steadily by {1e3 * abs(drift.rate):.3g} "
+        f"mm/s beside what winch {drift.cable} wound, as with an offset of {drift.rate:.3g} m/s in "
+        f"winch_speed_{drift.cable} (offset in [recording.columns] takes it out), or a rope that creeps"
+        for drift in winch_drifts(robot, recording)
+    ]
 
 
 def _drums_text(recording: Recording, scales: tuple[WinchScale, ...]) -> str:
