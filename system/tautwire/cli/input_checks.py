@@ -24,9 +24,9 @@ from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..recordings.winch_columns import ESTIMATED_FACTOR
 from ..robot.implausible_units import implausible_units
+from ..robot.mistaken_vertical import require_held_at_start
 from ..robot.robot_file_reader import MIN_CABLES, read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
-from ..robot.static_equilibrium import static_tensions
 from ..robot.uncertain_parameters import uncertain_parameters
 from ..toml_text import line_of_key
 from .console import columns_command, shell_quoted, with_columns
@@ -147,7 +147,7 @@ def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> 
             problems += [_robot_file_problem(path, text, error) for error in implausible]
         if not {error.key_path[:1] for error in errors} - KEYS_WITHOUT_INFLUENCE_ON_STATICS:
             with _collecting_problems(problems, path, _line_in_robot_file(text, ("platform", "start"))):
-                static_tensions(robot)
+                require_held_at_start(robot)
         problems += _check_robot_fmus(path, text, robot)
     problems.sort(key=_line_order)
     return robot
