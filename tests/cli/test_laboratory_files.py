@@ -349,6 +349,11 @@ ROBOTS: dict[str, tuple[str, str, str]] = {
     "anchors in mm": ("50.0, 50.0]", "50000.0, 50000.0]", "in mm multiply by 0.001"),
     "stiffer ropes": ("modulus = 1.022e11", "modulus = 1.022e12", "write it in Pa, 1.02e+11 fits"),
     "softer ropes": ("modulus = 1.022e11", "modulus = 1.022e10", "write it in Pa, 1.02e+11 fits"),
+    "an exit point without its last digit": (
+        "[0.0, -50.0, 50.0]",
+        "[0.0, -50.0, 5.0]",
+        "winch travel of cable 2 does not match the positions",
+    ),
     "a noise in mm": ("position_noise = 3e-4", "position_noise = 0.3", "if this is in mm as 0.0003"),
     "a noise in kN": ("tension_noise = 2.0", "tension_noise = 0.002", "if this is in kN as 2"),
     "a drum in mm": (

@@ -206,12 +206,14 @@ def speed_error(recording: Recording) -> RecordingError | None:
 
 
 def _is_better(points: PointMistake | None, odd: Sequence[OddWinch], motion: MotionCheck) -> bool:
-    """Whether mistaken points, or factors of single winches beside a frame, explain more than other readings do."""
+    """Whether mistaken points, factors of winches or one odd winch beside a frame explain more than other readings do.
+
+    Where all ropes but one follow their winches, the frame is the declared one.
+    """
     reading = motion.readings[0]
     is_frame = reading.geometry.rotation != IDENTITY
-    return (is_frame and _are_of_factors(odd)) or (
-        points is not None and MIN_IMPROVEMENT * points.misfit < reading.misfit
-    )
+    is_of_winches = is_frame and (_are_of_factors(odd) or len(odd) == 1)
+    return is_of_winches or (points is not None and MIN_IMPROVEMENT * points.misfit < reading.misfit)
 
 
 def _is_hopeless(robot: Robot, recording: Recording, motion: MotionCheck) -> bool:
