@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 from scipy.io import savemat
 from typer.main import get_command
@@ -125,6 +126,15 @@ def test_from_a_new_robot_on_each_line_leads_to_the_next(
         arguments = re.findall(r"tautwire (.+?)(?:,|;|$)", last)[0].split()
     assert gone == ["new", "check", "build", "fmus"]
     assert (tmp_path / "build" / "hall.ssp").exists()
+
+
+def test_a_recording_without_outputs_is_simulated_not_traced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    speeds = tmp_path / "speeds.csv"
+    pd.read_csv(FIT, usecols=["time", "winch_speed_1", "winch_speed_2", "winch_speed_3"], nrows=50).to_csv(speeds)
+    assert run(["check", ROBOT, str(speeds)]) == 0
+    assert f"next: tautwire simulate {ROBOT} --speeds {speeds} --out run.csv\n" in capsys.readouterr().err
 
 
 def test_a_checked_recording_is_traced_against_a_second_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -226,6 +226,10 @@ def check(
     if recording is None:
         next_command = f"tautwire build {shell_quoted(robot_file)} --out build/"
         output.suggest_next(f"{next_command}; with a recording of the robot add RECORDING.csv to this check")
+    elif result.recording and not (result.recording.has_position or result.recording.has_tension):
+        output.suggest_next(
+            f"tautwire simulate {shell_quoted(robot_file)} --speeds {shell_quoted(recording)} --out run.csv"
+        )
     else:
         next_command = trace_command(robot_file, recording, **files)
         option = f"--check SECOND{recording.suffix}"
