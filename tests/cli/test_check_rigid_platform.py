@@ -14,10 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from tautwire.cli import run
 from tautwire.cosimulation.recording_simulation import read_recorded_inputs
+from tautwire.errors import UnreachableError
 from tautwire.recordings.mistaken_motion import check_motion
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.support.pose_recordings import noisy, rope_lengths, rotation_of, wandering_poses, wandering_recording
 from tests.support.rigid_robots import crane_robot, suspended_robot
 
@@ -50,6 +52,18 @@ def test_quaternions_in_another_order_are_a_problem(tmp_path: Path, capsys: pyte
     (problem,) = result["problems"]
     assert status == 2 and "if the quaternion is written as x, y, z, w" in problem["problem"]
     assert 'qw = { name = "qz" }' in problem["hint"]
+
+
+def test_a_centre_of_mass_in_mm_is_the_only_problem_though_cables_do_not_hold_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    in_mm = replace(ROBOT, platform=replace(ROBOT.platform, centre_of_mass=(80.0, 0.0, 30.0)))
+    with pytest.raises(UnreachableError):
+        static_tensions(in_mm)
+    write_robot(in_mm, tmp_path / "crane.toml")
+    assert run(["check", str(tmp_path / "crane.toml"), "--json"]) == 2
+    (problem,) = json.loads(capsys.readouterr().out)["problems"]
+    assert "centre_of_mass" in problem["where"] and "in mm multiply by 0.001" in problem["hint"]
 
 
 def test_a_recording_without_orientation_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

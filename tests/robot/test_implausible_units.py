@@ -161,8 +161,10 @@ def test_a_rigid_platform_larger_than_its_frame_is_in_millimetres() -> None:
         replace(robot, cables=(*robot.cables[:2], attachment, *robot.cables[3:])), "robot.toml"
     )
     assert error.where == "robot.toml: cable[3].attachment" and "mm" in error.hint
-    far = replace(robot, platform=replace(robot.platform, centre_of_mass=(0.0, 0.0, 260.0)))
-    (error,) = implausible_units(far, "robot.toml")
+    frame = max(np.linalg.norm(np.subtract(cable.anchor, robot.platform.start)) for cable in robot.cables)
+    within, far = (replace(robot.platform, centre_of_mass=(0.0, 0.0, share * frame)) for share in (0.9, 1.1))
+    assert not list(implausible_units(replace(robot, platform=within), "robot.toml"))
+    (error,) = implausible_units(replace(robot, platform=far), "robot.toml")
     assert error.where == "robot.toml: platform.centre_of_mass"
     heavy = replace(robot, platform=replace(robot.platform, inertia=((36.6e6, 0, 0), (0, 33.2e6, 0), (0, 0, 20.1e6))))
     (error,) = implausible_units(heavy, "robot.toml")

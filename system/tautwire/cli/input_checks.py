@@ -39,6 +39,8 @@ MAX_ROBOT_FILE_PROBLEMS = 50
 MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
 # Keys that do not affect whether the cables hold the platform at the start.
 KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",), ("recording",)))
+# Where one of these is in another unit, statics says nothing of its own.
+POINTS = frozenset(("anchor", "attachment", "centre_of_mass", "start"))
 
 _LINE_OR_ROW = re.compile(r"(?<=: )((?:line|row) [0-9]+)(?=$|,)")
 _QUOTED_OR_NUMBER = re.compile(r"'(?:[^'\\]|\\.)*'|\"[^\"]*\"|(?<!\w)[-+]?[0-9][-+.0-9e]*")
@@ -142,10 +144,10 @@ def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> 
     problems += sorted((_robot_file_problem(path, text, error) for error in errors), key=_line_order)
     if robot is not None:
         problems += [_robot_file_problem(path, text, error) for error in _unit_errors(robot)]
-        if not errors:
-            implausible = implausible_units(robot, str(path))
-            problems += [_robot_file_problem(path, text, error) for error in implausible]
-        if not {error.key_path[:1] for error in errors} - KEYS_WITHOUT_INFLUENCE_ON_STATICS:
+        implausible = [] if errors else list(implausible_units(robot, str(path)))
+        problems += [_robot_file_problem(path, text, error) for error in implausible]
+        has_wrong_points = any(error.key_path[-1] in POINTS for error in implausible)
+        if not (has_wrong_points or {error.key_path[:1] for error in errors} - KEYS_WITHOUT_INFLUENCE_ON_STATICS):
             with _collecting_problems(problems, path, _line_in_robot_file(text, ("platform", "start"))):
                 require_held_at_start(robot)
         problems += _check_robot_fmus(path, text, robot)

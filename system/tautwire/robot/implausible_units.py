@@ -151,18 +151,19 @@ def _drum_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
 
 def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
     """Errors for attachments, centre of mass and radius of gyration far beyond the exit points."""
-    platform = robot.platform
-    reach = MAX_SIZE_RATIO * _frame_radius(robot)
-    points = [(("cable", index, "attachment"), cable.attachment) for index, cable in enumerate(robot.cables)]
-    for key_path, point in [*points, (("platform", "centre_of_mass"), platform.centre_of_mass)]:
+    platform, frame = robot.platform, _frame_radius(robot)
+    # Points may be far out on a mast; the mass of a platform lies within its frame.
+    points = [
+        (("cable", index, "attachment"), cable.attachment, MAX_SIZE_RATIO * frame)
+        for index, cable in enumerate(robot.cables)
+    ]
+    for key_path, point, reach in [*points, (("platform", "centre_of_mass"), platform.centre_of_mass, frame)]:
         distance = math.hypot(*point)
         if distance > reach:
             problem = f"is {distance:g} m from the platform's origin, robots of this frame have at most {reach:.3g}"
             yield _error(file, key_path, problem, "write it in m, if this is in mm multiply by 0.001")
     trace = sum(row[axis] for axis, row in enumerate(platform.inertia or ()))
     radius = math.sqrt(0.5 * trace / platform.mass)
-    # Points may be far out on a mast; the mass of a platform lies within its frame.
-    frame = _frame_radius(robot)
     if radius > frame:
         problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {frame:.3g}"
         units = "if this is in kg cm^2 multiply by 1e-4, in kg mm^2 by 1e-6, in g cm^2 by 1e-7"
