@@ -120,6 +120,30 @@ def test_what_is_likeliest_beside_a_small_disturbance_is_fitted_beside_it_if_not
     assert tried == ([(starts[drum][1], False), (starts[payload][0], False)] if is_tried else [])
 
 
+@pytest.mark.parametrize(("effects", "misses_much"), [(None, False), ({"payload": {"mass": 30.0}}, True)], ids=str)
+def test_a_robot_misses_much_if_its_sensors_show_it(effects: dict[str, Any] | None, misses_much: bool) -> None:
+    robot, recording = example("three"), recorded("three", 1, effects)
+    noise = estimate_noise(robot, recording)
+    fitter = Fitter(replace(noise, disturbance=disturbance_prior(robot, noise).median))
+    context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
+    assert candidate_scoring._misses_much(context) == misses_much
+
+
+@pytest.mark.parametrize("accepted", [(), (Hypothesis(BY_NAME["sag"], (1,)),)], ids=["first round", "later"])
+def test_other_disturbances_and_optima_are_tried_in_the_first_round_alone(
+    accepted: tuple[Hypothesis, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context, tried = of_one_recording(), list[str]()
+    search_round = SearchRound(1, context.robot, accepted, None, is_white=True, has_disturbance=True)
+    monkeypatch.setattr(Fitter, "log_likelihood", lambda *_: 0.0)
+    monkeypatch.setattr(candidate_scoring, "coarse_validation_likelihood", lambda *_: 0.0)
+    monkeypatch.setattr(candidate_scoring, "fit_candidates", lambda *_: {})
+    for name in ("_refitted_beside_small_disturbance", "_refitted_at_other_optima"):
+        monkeypatch.setattr(candidate_scoring, name, lambda *_, name=name: tried.append(name) or {})
+    candidate_scoring._scores_beside_disturbance(context, "round 1", search_round, {})
+    assert len(tried) == (0 if accepted else 2)
+
+
 @pytest.mark.parametrize(
     ("is_astray", "refit_evidence", "is_replaced"),
     [(True, 900.0, True), (True, 700.0, False), (False, 900.0, False)],

@@ -553,3 +553,25 @@ def test_a_first_round_is_kept_where_time_ends_before_another_interpolation_is_s
     assert selection.context.split is (context.split if ends else other)
     assert bool(selection.complete_rounds) == bool(ends)
     assert bool(context.time_limit.untried) == bool(ends)
+
+
+@pytest.mark.parametrize("ends", ["never", "in the first round", "in the second round"])
+def test_each_effect_was_tried_where_time_lasts_for_the_first_round(monkeypatch: pytest.MonkeyPatch, ends: str) -> None:
+    context, rounds = context_with(has_disturbance=False), [0]
+    fit = Fit.without_parameters(context.robot)
+
+    def score(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+        rounds[0] += 1
+        if ends == ("in the first round" if rounds[0] == 1 else "in the second round"):
+            context.leave_untried("fits")
+        hypothesis = Hypothesis(BY_NAME["creep"], (rounds[0],))
+        fitted = replace(fit, robot=context.robot.with_effect(hypothesis.setting(context.robot)))
+        return [CandidateScore(hypothesis, fitted, 1e6 if rounds[0] == 1 else 0.0, 1.5)], True
+
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
+    monkeypatch.setattr(stepwise_selection, "likelier_interpolation", lambda *_: None)
+    monkeypatch.setattr(stepwise_selection, "score_candidates", score)
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter)
+    selection.add()
+    assert rounds[0] == 2
+    assert selection.result().has_tried_each == (ends != "in the first round")

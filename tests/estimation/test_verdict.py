@@ -15,8 +15,9 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.selection_result import SelectionResult
-from tautwire.estimation.trace_result import FoundEffect
-from tautwire.estimation.verdict import verdict_beside_disturbance, verdict_of
+from tautwire.estimation.time_limit import TimeLimit
+from tautwire.estimation.trace_result import FoundEffect, Verdict
+from tautwire.estimation.verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -221,3 +222,27 @@ def test_an_effect_that_uncertain_numbers_imitate_well_cancels_none() -> None:
     of = shares(0.02, 28.0, payload=(0.98, 121.0))
     assert verdict(of, "payload")[0] == "unexplained"
     assert verdict(replace(of, size_together=121.0), "payload")[0] == "effects"
+
+
+@pytest.mark.parametrize(
+    ("word", "is_little_missed", "told", "sentence"),
+    [
+        ("none", False, "unexplained", "The search ended at its time limit of 600 s; until then nothing was found"),
+        ("none", True, "none", "Little is missed. The search ended at its time limit of 600 s, before all was tried."),
+        (
+            "unexplained",
+            True,
+            "unexplained",
+            "The search ended at its time limit of 600 s. Until then: little is missed",
+        ),
+        ("effects", True, "effects", "Little is missed. The search ended at its time limit of 600 s, before all was"),
+    ],
+)
+def test_a_search_that_ended_early_says_none_only_of_what_is_little_after_each_effect_was_tried(
+    word: Verdict, is_little_missed: bool, told: str, sentence: str
+) -> None:
+    limit, verdict = TimeLimit(600.0), (word, "Little is missed.")
+    assert verdict_of_ended_search(verdict, limit, is_little_missed) == verdict
+    limit.leave_untried("There was no time for effects.")
+    shown = verdict_of_ended_search(verdict, limit, is_little_missed)
+    assert shown[0] == told and shown[1].startswith(sentence)

@@ -8,8 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.recordings.consistency import recording_mistakes
-from tautwire.recordings.odd_winches import odd_winches
+from tautwire.recordings.alternative_readings import winding_as_declared
+from tautwire.recordings.consistency import _is_better, recording_mistakes
+from tautwire.recordings.geometry_reading import IDENTITY, GeometryReading
+from tautwire.recordings.mistaken_motion import MotionCheck, MotionReading
+from tautwire.recordings.odd_winches import OddWinch, odd_winches
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.schema import Robot
 from tests.support.robots import EXAMPLES, example
@@ -219,3 +222,14 @@ def test_what_happened_in_a_gap_is_not_judged() -> None:
     is_kept = (recording.time < 10.0) | (recording.time > 15.0)
     parts = {name: getattr(recording, name)[is_kept] for name in ("time", "winch_speed", "tension", "position")}
     assert odd_winches(example("three"), replace(recording, **parts, orientation=recording.orientation[is_kept])) == ()
+
+
+@pytest.mark.parametrize(("count", "is_turned", "is_told"), [(1, True, True), (2, True, False), (1, False, False)])
+def test_one_odd_winch_is_told_before_a_turned_frame_that_would_explain_it(
+    count: int, is_turned: bool, is_told: bool
+) -> None:
+    turned = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    geometry = GeometryReading(rotation=turned if is_turned else IDENTITY)
+    motion = MotionCheck(0.2, (MotionReading(geometry, winding_as_declared(3), 0.01, ()),))
+    odd = [OddWinch(cable, 0.3, "its exit point is elsewhere", "correct it") for cable in range(1, count + 1)]
+    assert _is_better(None, odd, motion) == is_told

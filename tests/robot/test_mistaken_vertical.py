@@ -60,5 +60,17 @@ def test_a_start_that_no_vertical_explains_is_refused_as_it_is() -> None:
     assert "upwards" not in refused.value.hint
 
 
+def test_no_vertical_is_told_where_two_would_do() -> None:
+    robot, start = example("three"), np.array([1.0, 2.0, 3.0])
+    ropes = ((5.0, -1.0, 1.0), (-1.0, 5.0, 1.0), (1.0, 1.0, -5.0))
+    cables = tuple(
+        replace(cable, anchor=tuple((start + rope).tolist())) for cable, rope in zip(robot.cables, ropes, strict=True)
+    )
+    ambiguous = replace(robot, platform=replace(robot.platform, start=tuple(start.tolist())), cables=cables)
+    with pytest.raises(UnreachableError) as refused:
+        require_held_at_start(ambiguous)
+    assert "upwards" not in refused.value.hint
+
+
 def test_what_the_cables_hold_is_not_refused() -> None:
     require_held_at_start(example("three"))

@@ -22,7 +22,8 @@ class SelectionResult:
     """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates.
 
     ``disturbance`` is the one beside them, None where none was assumed; ``split`` are the data with winch speeds
-    interpolated otherwise than those that the search began with, where these are likelier.
+    interpolated otherwise than those that the search began with, where these are likelier. ``has_tried_each`` tells
+    whether there was time to try each effect by itself.
     """
 
     accepted: tuple[Hypothesis, ...]
@@ -32,6 +33,7 @@ class SelectionResult:
     confusable: tuple[tuple[str, ...], ...]
     disturbance: Disturbance | None = None
     split: DataSplit | None = None
+    has_tried_each: bool = False
 
     def substantial(self, policy: SelectionPolicy) -> tuple[Hypothesis, ...]:
         """The accepted hypotheses with more evidence than what the strongest one's form may leave."""

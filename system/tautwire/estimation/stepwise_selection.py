@@ -94,6 +94,7 @@ class _StepwiseSelection:
     evidences: dict[Hypothesis, float] = field(default_factory=dict)
     survivors: list[Hypothesis] = field(default_factory=list)
     split: DataSplit | None = None
+    has_tried_each: bool = False
 
     def add(self) -> None:
         """Forward selection: the best hypothesis of each round, while it is significant."""
@@ -107,6 +108,7 @@ class _StepwiseSelection:
             scores, is_complete = score_candidates(self.context, search_round)
             if not self.accepted:
                 scores, is_complete = self._likelier_scores(number, scores, is_complete)
+                self.has_tried_each = not self.context.time_limit.untried
             if is_complete:
                 self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
@@ -270,6 +272,7 @@ class _StepwiseSelection:
             tuple((a.effect.name, other) for a in self.accepted for other in self.confusable.get(a, ())),
             self.context.fitter.noise.disturbance,
             self.split,
+            self.has_tried_each,
         )
 
     def _accept_beside(self, others: Sequence[Hypothesis], best: CandidateScore) -> None:

@@ -114,13 +114,19 @@ def _is_small_disturbance(context: IdentificationContext, shares: ExplainedShare
     return is_small_force and max(errors) <= policy.max_sensor_error
 
 
-def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> tuple[Verdict, str]:
-    """The verdict of a search that had to leave something untried: never that nothing is missing."""
+def verdict_of_ended_search(
+    verdict: tuple[Verdict, str], limit: TimeLimit, is_little_missed: bool = False
+) -> tuple[Verdict, str]:
+    """The verdict of a search that had to leave something untried.
+
+    Never that nothing is missing, but for where ``is_little_missed``: after each effect was tried by itself what is
+    missed beside a disturbance is little, whatever would have been tried next.
+    """
     word, sentence = verdict
     if not limit.untried:
         return verdict
     ended = f"The search ended at its time limit of {limit.seconds:g} s"
-    if word == "none":
+    if word == "none" and not is_little_missed:
         return "unexplained", f"{ended}; until then nothing was found that the model lacks."
     if word == "unexplained":
         return "unexplained", f"{ended}. Until then: {sentence[0].lower()}{sentence[1:]}"

@@ -74,7 +74,7 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
     )
     has_resonance = bool(state.unexplained.resonances)
     verdict = verdict_beside_disturbance(context, state.selection, shares, missed, remaining, has_resonance)
-    verdict = verdict_of_ended_search(verdict, context.time_limit)
+    verdict = verdict_of_ended_search(verdict, context.time_limit, state.selection.has_tried_each)
     state = replace(state, verdict=verdict, effects_hold=verdict[0] in ("effects", "discovered"))
     if verdict[0] == "none":
         max_sigmas = context.policy.size.max_calibration_sigmas

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..errors import UnreachableError
-from .schema import AXES, Point, Robot
+from .schema import Point, Robot
 from .static_equilibrium import static_tensions
 
 # By the axis of the file that points upwards: the file's numbers that are to stand for x, y, z, and the turn to these.
@@ -32,7 +32,7 @@ def require_held_at_start(robot: Robot) -> None:
         static_tensions(robot)
     except UnreachableError as error:
         upward = [axis for axis, (_, turn) in COORDINATES.items() if _is_held(_turned(robot, turn))]
-        if len(robot.axes_in_plane) < len(AXES) or len(upward) != 1:
+        if len(upward) != 1:
             raise
         (axis,) = upward
         hint = (
